@@ -1,0 +1,38 @@
+#pragma once
+#include <string>
+
+#include "drivers/axis_group.h"
+
+/// The laser in two halves: *enable* (key, interlock, emission armed once per job) and *gate* (one dot's pulse, timed by the device).
+/// Life cycle: disconnected -> connected -> enabled (start delay is paid here) -> ready; emitting counts as moving; any -> fault.
+namespace hilbrush {
+
+class Laser {
+ public:
+  struct Status {
+    DeviceState state = DeviceState::kDisconnected;
+    bool is_emitting = false;
+    bool interlock_closed = false;
+    std::string fault;
+  };
+  struct Limits {
+    double power_min_w = 0, power_max_w = 0, pulse_min_s = 0, pulse_max_s = 0;
+  };
+
+  virtual ~Laser() = default;
+  virtual void connect() = 0;
+  virtual Limits limits() = 0;
+  /// Arms emission: key and interlock are checked, the start delay is waited for. No light yet. @throws DriverError
+  virtual void enable() = 0;
+  /// Emission can't happen any more until enable(). From any thread, idempotent, never throws.
+  virtual void disable() noexcept = 0;
+  /// Starts one pulse; the device itself ends it after pulse_s, whatever happens to the caller. Executor's thread only.
+  /// @throws DriverError if not enabled, outside limits(), interlock open, or still emitting.
+  virtual void fire(double power_w, double pulse_s) = 0;
+  /// The gate off, now. From any thread, idempotent, never throws. True if the device confirms that it is off.
+  virtual bool off() noexcept = 0;
+  virtual Status status() = 0;  ///< from any thread
+  virtual void clear_fault() = 0;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,22 @@
+#pragma once
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "planner/exposure_program.h"
+
+/// An exposure program as a binary little-endian PLY: element `vertex` (one an exposure: x y z nx ny nz tone energy j1 j2 j3 j4 a c power
+/// pulse incidence dot), element `via` (before j1 j2 j3 j4 a c); provenance, pitch and the SHA-256 of the body in comments.
+/// Opens in MeshLab, CloudCompare and Open3D as a point cloud.
+namespace hilbrush {
+
+struct ProgramFileError : std::runtime_error {
+  using std::runtime_error::runtime_error;  ///< "file: sentence"
+};
+
+/// Written to a temporary name and renamed, so a program file is whole or absent. @throws ProgramFileError
+void write_program(const ExposureProgram& program, const std::filesystem::path& file);
+/// @throws ProgramFileError if the file is no program, is cut short, or its SHA-256 does not fit.
+ExposureProgram read_program(const std::filesystem::path& file);
+
+}  // namespace hilbrush

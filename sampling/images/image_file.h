@@ -1,0 +1,27 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sampling/textured_mesh.h"
+
+/// Image files through OpenImageIO; the only place that knows it.
+namespace hilbrush {
+
+/// An ImageReader (see model_file.h): PNG, JPEG, GIF, TGA, BMP, TIFF; sRGB to linear light; luminance by Rec. 709.
+/// Truncated and corrupt files are refused even where OpenImageIO reports success.
+std::optional<Texture> load_image_file(const std::filesystem::path& file, std::size_t pixel_limit, std::string& reason);
+
+/// An 8-bit sRGB-encoded picture for people, row 0 at the top. channels is 1 or 3.
+struct Picture {
+  int width = 0, height = 0, channels = 1;
+  std::vector<std::uint8_t> pixels;
+};
+
+/// Writes a PNG. @throws InputError naming the file if it can't be written.
+void save_png(const Picture& picture, const std::filesystem::path& file);
+
+}  // namespace hilbrush

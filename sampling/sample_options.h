@@ -1,0 +1,25 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+
+/// Settings of sampling. Std only, so that config/ can read them.
+namespace hilbrush {
+
+/// How a dot is placed in its stratum (a stretch of the curve that holds the mass of one dot).
+enum class Sampler {
+  kCentroid,  ///< at the stratum's centre of mass, put back on the surface (default)
+  kJittered,  ///< at a random place along the stratum (the thesis, section 4.4)
+  kEven,      ///< in the middle of the stratum along the curve
+  kRandom     ///< anywhere along the whole curve, sorted: the control
+};
+
+struct SampleOptions {
+  std::optional<double> pitch_m;              ///< the count follows: mass / pitch^2, rounded
+  std::optional<std::uint64_t> dot_count;     ///< or exactly so many; the pitch follows
+  Sampler sampler = Sampler::kCentroid;
+  std::uint64_t seed = 1;
+  double omega = 4;                           ///< a quad is split while it may misplace more than 1/omega of a dot
+  std::uint64_t dot_limit = 50'000'000;       ///< more is an InputError that names dpi and size
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,31 @@
+#pragma once
+#include <string>
+#include <vector>
+
+/// Options of the tone: what the paint can show and what must be asked of it. Std only, so that config/ can read them.
+namespace hilbrush {
+
+/// Asked coverage for wanted coverage, both 0 = white, 1 = one full dot a pitch squared; undoes dot gain. Piecewise linear.
+/// `asked` may exceed 1: where the paint needs more than one dot's energy a pitch squared to be black.
+struct ToneCurve {
+  std::vector<double> wanted;  ///< strictly rising from 0 to 1
+  std::vector<double> asked;   ///< rising, same length; both empty: identity
+
+  double operator()(double coverage) const;
+};
+
+/// What to do with surface that has neither texture nor colours.
+enum class Untextured {
+  kAuto,     ///< blank if any other part has texture or colours, else its material is painted
+  kBlank,    ///< never painted
+  kMaterial  ///< its material is painted
+};
+
+struct ToneOptions {
+  double reflectance_white = 1;  ///< linear-light reflectance of unexposed paint ...
+  double reflectance_black = 0;  ///< ... and of fully exposed paint (Murray-Davies)
+  Untextured untextured = Untextured::kAuto;
+  ToneCurve curve;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,29 @@
+#pragma once
+#include <functional>
+
+#include "sampling/tone_field.h"
+#include "sim/film/film.h"
+
+/// How well the painted picture matches the wanted one, in linear-light coverage on the surface (README, "Fidelity").
+namespace hilbrush {
+
+struct FidelityFigures {
+  double f1_db = 0, f2_db = 0;   ///< -10 log10 of the mean squared difference of Gaussian means, sigma = 1 and 2 pitches
+  double s2 = 0;                 ///< SSIM of six views
+  double tone_rms = 0, tone_max = 0;  ///< error of mean tone per tenth of wanted tone, at 2 pitches, weighted by area
+  double p999 = 0;               ///< 99.9th percentile of the absolute error at 2 pitches
+};
+
+struct Fidelity {
+  FidelityFigures reachable;     ///< over surface whose own reach test passes
+  FidelityFigures whole;
+  double unreachable_share = 0;  ///< of the area
+};
+
+/// Whether the surface at a point can be exposed at all (the planner's Reach, passed in by whoever has it).
+using ReachTest = std::function<bool(const SurfacePoint&)>;
+
+Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTest& is_reachable, std::uint64_t seed,
+                          const Progress& progress = {});
+
+}  // namespace hilbrush
