@@ -1,0 +1,1 @@
+#include "planner/cell_description.h"

@@ -1,0 +1,1 @@
+#include "planner/exposure_program.h"

@@ -1,0 +1,1 @@
+#include "planner/sha256.h"

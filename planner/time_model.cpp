@@ -1,0 +1,1 @@
+#include "planner/time_model.h"

@@ -1,0 +1,1 @@
+#include "sampling/images/image_file.h"

@@ -1,0 +1,1 @@
+#include "sim/devices/sim_cell.h"
