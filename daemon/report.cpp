@@ -1,1 +1,166 @@
-// replaced
+#include "daemon/report.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+/// Figures are for people too: six digits are more than any of them is worth, and infinities are not JSON.
+Json figure(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  if (value == 0) return 0.0;
+  const double scale = std::pow(10., 5 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
+}
+
+/// Components in the order of the curve, grouped by how they are ordered and why.
+Json orders_json(const std::vector<ComponentReport>& components) {
+  std::map<std::string, std::size_t> by_reason;
+  std::size_t mapped = 0;
+  for (const auto& component : components) {
+    if (component.is_mapped)
+      ++mapped;
+    else
+      ++by_reason[component.order_reason];
+  }
+  Json orders = Json::array();
+  if (mapped > 0) orders.push_back({{"order", "square map"}, {"components", mapped}});
+  for (const auto& [reason, count] : by_reason)
+    orders.push_back({{"order", "3D Hilbert"}, {"components", count}, {"reason", reason}});
+  return orders;
+}
+
+Json mesh_json(const Report::Mesh& mesh) {
+  int genus = 0, loops = 0;
+  bool is_genus_known = true;
+  for (const auto& component : mesh.components) {
+    is_genus_known = is_genus_known && component.genus >= 0;
+    genus += std::max(component.genus, 0);
+    loops += component.boundary_loops;
+  }
+  Json repairs = Json::array();
+  for (const auto& repair : mesh.repairs) repairs.push_back({{"what", repair.what}, {"count", repair.count}});
+  return {{"file", mesh.file},
+          {"vertices", mesh.vertices},
+          {"faces", mesh.faces},
+          {"components", mesh.components.size()},
+          {"genus", is_genus_known ? Json(genus) : Json(nullptr)},
+          {"boundary_loops", loops},
+          {"area_mm2", figure(mesh.area_m2 * 1e6)},
+          {"orders", orders_json(mesh.components)},
+          {"repairs", repairs},
+          {"warnings", mesh.warnings}};
+}
+
+Json dots_json(const DotCounts& dots) {
+  return {{"requested", dots.requested}, {"placed", dots.placed},       {"exposed", dots.exposed},
+          {"in_doubt", dots.in_doubt},   {"remaining", dots.remaining}, {"skipped", dots.skipped}};
+}
+
+Json fidelity_json(const FidelityFigures& figures) {
+  return {{"f1_db", figure(figures.f1_db)},       {"f2_db", figure(figures.f2_db)},       {"s2", figure(figures.s2)},
+          {"tone_rms", figure(figures.tone_rms)}, {"tone_max", figure(figures.tone_max)}, {"p999", figure(figures.p999)}};
+}
+
+}  // namespace
+
+IncidenceFigures incidence_figures(const ExposureProgram& program) {
+  if (program.exposures.empty()) return {};
+  std::vector<float> incidences;
+  incidences.reserve(program.exposures.size());
+  double sum = 0;
+  for (const auto& exposure : program.exposures) {
+    incidences.push_back(exposure.incidence);
+    sum += exposure.incidence;
+  }
+  std::sort(incidences.begin(), incidences.end());
+  const std::size_t count = incidences.size();
+  return {sum / static_cast<double>(count) * kDegrees, incidences[(count - 1) * 95 / 100] * kDegrees, incidences.back() * kDegrees};
+}
+
+std::string report_to_json(const Report& report) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+
+  Json json;
+  json["mesh"] = mesh_json(report.mesh);
+  json["dots"] = dots_json(report.dots);
+  json["pitch_mm"] = figure(report.pitch_m * 1e3);
+  json["incidence_deg"] = {{"mean", figure(report.incidence.mean_deg)},
+                           {"p95", figure(report.incidence.p95_deg)},
+                           {"max", figure(report.incidence.max_deg)}};
+  json["time_s"] = {{"move", figure(report.time.move_s)},
+                    {"settle", figure(report.time.settle_s)},
+                    {"expose", figure(report.time.expose_s)},
+                    {"retract", figure(report.time.retract_s)},
+                    {"total", figure(report.time.total_s())}};
+  json["path"] = {{"length_mm", figure(report.path.path_length_m * 1e3)},
+                  {"constant", figure(report.path.path_constant)},
+                  {"patches", report.path.patch_count}};
+  if (report.fidelity) {
+    json["fidelity"] = fidelity_json(report.fidelity->reachable);
+    json["fidelity"]["unreachable_share"] = figure(report.fidelity->unreachable_share);
+    json["fidelity"]["whole"] = fidelity_json(report.fidelity->whole);
+  }
+  if (report.hits) {
+    json["hits"] = {{"max_error_um", figure(report.hits->max_error_um)},
+                    {"off_target", report.hits->off_target},
+                    {"shadowed", report.hits->shadowed}};
+  }
+  double total_s = 0;
+  for (const auto& [stage, seconds] : report.stages_s) {
+    json["stages_s"][stage] = figure(seconds);
+    total_s += seconds;
+  }
+  json["stages_s"]["total"] = figure(total_s);
+  json["cpu_s"] = figure(static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+                         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec));
+  json["peak_rss_mb"] = figure(static_cast<double>(usage.ru_maxrss) / 1024);
+  json["files"] = report.files;
+  json["settings"] = Json::parse(report.settings_json);
+  json["seed"] = report.seed;
+  json["version"] = HILBRUSH_VERSION;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+DotCounts dot_counts_from_report(const std::filesystem::path& report_file) {
+  std::ifstream in(report_file);
+  if (!in) throw InputError(report_file.string(), "can't be read; `develop` needs the report that `plan` wrote beside the program");
+  try {
+    const Json dots = Json::parse(in).at("dots");
+    DotCounts counts;
+    counts.requested = dots.at("requested").get<std::uint64_t>();
+    counts.placed = dots.at("placed").get<std::uint64_t>();
+    for (const auto& [reason, count] : dots.at("skipped").items()) counts.skipped[reason] = count.get<std::uint64_t>();
+    return counts;
+  } catch (const Json::exception& error) {
+    throw InputError(report_file.string(), std::string("is no report of this program: ") + error.what());
+  }
+}
+
+void write_text_file(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path temporary = file.string() + ".part";
+  {
+    std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
+    out << text;
+    out.flush();
+    if (!out) throw InputError(file.string(), "can't be written (no such folder, no permission, or the disk is full)");
+  }
+  std::error_code error;
+  std::filesystem::rename(temporary, file, error);
+  if (error) throw InputError(file.string(), "can't be written: " + error.message());
+}
+
+}  // namespace hilbrush
