@@ -1,1 +1,349 @@
-// replaced
+#include "daemon/pipeline.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include "config/cell_file.h"
+#include "daemon/executor.h"
+#include "daemon/painted_dots.h"
+#include "daemon/report.h"
+#include "planner/plan.h"
+#include "planner/program_check.h"
+#include "planner/program_file.h"
+#include "planner/sha256.h"
+#include "sampling/dots_file.h"
+#include "sampling/images/image_file.h"
+#include "sampling/input_error.h"
+#include "sampling/mesh_repair.h"
+#include "sampling/model_file.h"
+#include "sampling/placement.h"
+#include "sampling/sample.h"
+#include "sim/devices/sim_cell.h"
+#include "sim/film/calibrate.h"
+#include "sim/film/fidelity.h"
+#include "sim/film/film.h"
+#include "sim/film/views.h"
+
+namespace hilbrush {
+namespace {
+
+/// Names the stage that runs, forwards its progress and keeps its seconds.
+class Stages {
+ public:
+  explicit Stages(const PipelineListener& listener) : listener_(listener) {}
+
+  template <class Work>
+  auto run(const char* stage, Work work) {
+    const auto begin = std::chrono::steady_clock::now();
+    tell(stage, 0);
+    auto result = work([this, stage](double fraction) { tell(stage, fraction); });
+    seconds_.emplace_back(stage, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    return result;
+  }
+  void warn(const std::string& sentence) const {
+    if (listener_.on_warning) listener_.on_warning(sentence);
+  }
+  const std::vector<std::pair<std::string, double>>& seconds() const { return seconds_; }
+
+ private:
+  void tell(const char* stage, double fraction) const {
+    if (listener_.on_progress) listener_.on_progress(stage, fraction);
+  }
+
+  const PipelineListener& listener_;
+  std::vector<std::pair<std::string, double>> seconds_;
+};
+
+std::string hash_of_files(const std::vector<std::filesystem::path>& files) {
+  Sha256 hash;
+  std::vector<std::uint8_t> block(1 << 16);
+  for (const auto& file : files) {
+    std::ifstream in(file, std::ios::binary);
+    while (in.read(reinterpret_cast<char*>(block.data()), static_cast<std::streamsize>(block.size())) ||
+           in.gcount() > 0)
+      hash.update(std::span(block.data(), static_cast<std::size_t>(in.gcount())));
+  }
+  return hash.hex_digest();
+}
+
+/// The settings that shape a program. Where it runs (cell) has a hash of its own, and whether it is a dry run changes
+/// nothing.
+std::string hash_of_settings(JobSettings settings) {
+  settings.cell = "-";
+  settings.dry_run = false;
+  return sha256_hex(job_settings_to_json(settings));
+}
+
+PlacementOptions placement_options(const JobSettings& settings) {
+  PlacementOptions options;
+  if (settings.size_mm) options.size_m = *settings.size_mm * 1e-3;
+  if (settings.units_mm) options.unit_m = *settings.units_mm * 1e-3;
+  if (settings.up) options.up = *settings.up == "y" ? UpAxis::kY : UpAxis::kZ;
+  return options;
+}
+
+void make_output_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder))
+    throw InputError(folder.string(),
+                     "can't be made or is no folder" + (error ? ": " + error.message() : std::string()));
+}
+
+/// The object on the table: everything that later stages look at but never edit. Members refer to each other, so it
+/// never moves.
+struct Workpiece {
+  Workpiece(const PipelineRequest& request, Stages& stages)
+      : cell(load_cell(request.cell_file)), settings(request.settings) {
+    Model model = stages.run("load", [&](const Progress&) { return load_model(request.model, load_image_file); });
+    report.mesh.file = request.model.filename().string();
+    report.mesh.warnings = model.warnings;
+    report.settings_json = job_settings_to_json(settings);
+    report.seed = settings.seed;
+    provenance = {hash_of_files(model.files), hash_of_settings(settings), cell.sha256, HILBRUSH_VERSION};
+
+    auto repaired = stages.run(
+        "disk", [&](const Progress&) { return repair_mesh(place_on_table(model, placement_options(settings))); });
+    mesh = std::move(repaired.mesh);
+    report.mesh.repairs = std::move(repaired.repairs);
+    report.mesh.vertices = mesh.vertices.size();
+    report.mesh.faces = mesh.triangle_count();
+    report.mesh.area_m2 = mesh.area_m2();
+
+    bool is_calibrated = false;
+    tone_options = hilbrush::tone_options(cell, sampler_name(settings.sampler), &is_calibrated);
+    tone_options.untextured = settings.untextured;
+    if (!is_calibrated)
+      report.mesh.warnings.push_back("the cell file has no tone curve for sampler \"" +
+                                     std::string(sampler_name(settings.sampler)) +
+                                     "\": tones will be off; `hilbrush calibrate` makes one");
+    for (const auto& warning : report.mesh.warnings) stages.warn(warning);
+    tone.emplace(mesh, tone_options);
+  }
+
+  CellDescription cell;
+  JobSettings settings;
+  Provenance provenance;
+  TexturedMesh mesh;
+  ToneOptions tone_options;
+  std::optional<ToneField> tone;
+  Report report;
+};
+
+struct PlannedWork {
+  DotSequence dots;
+  Plan plan;
+};
+
+std::vector<std::string> skip_reason_names() {
+  std::vector<std::string> names{"exposed"};
+  for (int r = 0; r <= static_cast<int>(SkipReason::kEnergy); ++r)
+    names.emplace_back(skip_reason_name(static_cast<SkipReason>(r)));
+  return names;
+}
+
+void save_dots(const PlannedWork& work, const std::filesystem::path& file) {
+  std::vector<std::uint8_t> reasons(work.dots.dots.size(), 0);
+  for (const auto& skipped : work.plan.skipped)
+    reasons[skipped.dot_index] = static_cast<std::uint8_t>(1 + static_cast<int>(skipped.reason));
+  const auto names = skip_reason_names();
+  write_dots(work.dots, reasons, names, file);
+}
+
+void refuse_faulty_program(const std::vector<ProgramFault>& faults) {
+  if (faults.empty()) return;
+  std::string sentence = "the finished program fails its check and is not written:";
+  for (std::size_t i = 0; i < std::min<std::size_t>(faults.size(), 5); ++i)
+    sentence += "\n  exposure " + std::to_string(faults[i].exposure) + ": " + faults[i].what;
+  throw std::logic_error(sentence);
+}
+
+DotSequence sample_dots(Workpiece& piece, Stages& stages) {
+  const auto curve = stages.run(
+      "curve", [&](const Progress& progress) { return std::make_unique<SurfaceCurve>(piece.mesh, progress); });
+  piece.report.mesh.components = curve->components();
+  return stages.run("dots", [&](const Progress& progress) {
+    return place_dots(*curve, *piece.tone, sample_options(piece.settings), &piece.report.path, progress);
+  });
+}
+
+PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesystem::path& output, Stages& stages) {
+  PlannedWork work;
+  work.dots = sample_dots(piece, stages);
+  Report& report = piece.report;
+  report.pitch_m = work.dots.pitch_m;
+
+  work.plan = stages.run("plan", [&](const Progress& progress) { return plan_exposures(reach, work.dots, progress); });
+  work.plan.program.provenance = piece.provenance;
+  refuse_faulty_program(stages.run("check", [&](const Progress& progress) {
+    return check_program(work.plan.program, work.plan.skipped, work.dots, piece.mesh, piece.cell,
+                         plan_options(piece.settings), 20, progress);
+  }));
+
+  report.dots.placed = work.dots.dots.size();
+  report.dots.requested = piece.settings.dots.value_or(report.dots.placed);
+  report.dots.remaining = work.plan.program.exposures.size();
+  for (const auto& skipped : work.plan.skipped) ++report.dots.skipped[skip_reason_name(skipped.reason)];
+  report.incidence = incidence_figures(work.plan.program);
+  report.time = work.plan.time;
+
+  write_program(work.plan.program, output / "program.ply");
+  save_dots(work, output / "dots.ply");
+  report.files = {"report.json", "program.ply", "dots.ply"};
+  return work;
+}
+
+/// Runs the program on a simulated cell in virtual time; returns what its laser recorded.
+std::vector<Emission> paint_in_simulation(const ExposureProgram& program, CellDescription description,
+                                          const Progress& progress) {
+  description.simulation.time_scale = 0;
+  SimCell sim(description);
+  std::vector<Emission> emissions;
+  emissions.reserve(program.exposures.size());
+  sim.set_emission_sink([&emissions](const Emission& emission) { emissions.push_back(emission); });
+  const Cell cell = sim.cell();
+  bring_up(cell);
+
+  Journal journal = Journal::in_memory(program.exposures.size());
+  ExecutionControl control;
+  const auto total = static_cast<double>(std::max<std::size_t>(program.exposures.size(), 1));
+  const ExecutionResult result = execute(program, {}, cell, description, journal, control,
+                                         [&](std::size_t done) { progress(static_cast<double>(done) / total); });
+  cell.laser.disable();
+  if (result.outcome != ExecutionOutcome::kFinished)
+    throw std::logic_error("the simulated cell did not finish the program: " + result.reason);
+  return emissions;
+}
+
+std::vector<Eigen::Vector3d> positions_of_unexposed(const DotSequence& dots, const ExposureProgram& program) {
+  std::vector<bool> is_exposed(dots.dots.size(), false);
+  for (const auto& exposure : program.exposures)
+    if (exposure.dot_index < is_exposed.size()) is_exposed[exposure.dot_index] = true;
+  std::vector<Eigen::Vector3d> positions;
+  for (std::size_t i = 0; i < dots.dots.size(); ++i)
+    if (!is_exposed[i]) positions.push_back(dots.dots[i].position_O);
+  return positions;
+}
+
+/// Film, fidelity and pictures from what was emitted; completes the report.
+void develop_and_judge(Workpiece& piece, const Reach& reach, const PlannedWork& work,
+                       std::span<const Emission> emissions, const std::filesystem::path& output, Stages& stages) {
+  Report& report = piece.report;
+  const ExposureProgram& program = work.plan.program;
+  Film film(piece.mesh, piece.cell, program.pitch_m);
+  const auto hits = stages.run("paint", [&](const Progress& progress) { return film.expose(emissions, progress); });
+
+  const PaintedDots painted = match_emissions(program, emissions, hits);
+  report.dots.exposed = painted.exposed;
+  report.dots.in_doubt = painted.in_doubt;
+  report.dots.remaining = program.exposures.size() - painted.exposed - painted.in_doubt;
+  report.hits = painted.hits;
+  if (painted.foreign > 0)
+    report.mesh.warnings.push_back(std::to_string(painted.foreign) +
+                                   " recorded emissions belong to no exposure of the program");
+  if (painted.repeated > 0)
+    report.mesh.warnings.push_back(std::to_string(painted.repeated) + " exposures were emitted more than once");
+
+  const auto files = stages.run("images", [&](const Progress& progress) {
+    const ReachTest is_reachable = [&](const SurfacePoint& point) {
+      return reach.is_reachable(position(piece.mesh, point), face_normal(piece.mesh, point));
+    };
+    report.fidelity =
+        measure_fidelity(film, *piece.tone, is_reachable, piece.settings.seed, [&](double f) { progress(.5 * f); });
+    return write_pictures(film, *piece.tone, positions_of_unexposed(work.dots, program), output,
+                          [&](double f) { progress(.5 + .5 * f); });
+  });
+  for (const auto& file : files) report.files.push_back(std::filesystem::relative(file, output).string());
+}
+
+std::string save_report(Workpiece& piece, const Stages& stages, const std::filesystem::path& output) {
+  piece.report.stages_s = stages.seconds();
+  const std::string text = report_to_json(piece.report);
+  write_text_file(output / "report.json", text);
+  return text;
+}
+
+ExposureProgram read_own_program(const Workpiece& piece, const std::filesystem::path& file) {
+  ExposureProgram program = read_program(file);
+  const auto refuse = [&](const char* what) {
+    throw InputError(file.string(), std::string("was made for ") + what + "; it is not run or developed with this one");
+  };
+  if (program.provenance.model_sha256 != piece.provenance.model_sha256) refuse("another model");
+  if (program.provenance.settings_sha256 != piece.provenance.settings_sha256) refuse("other settings");
+  if (program.provenance.cell_sha256 != piece.provenance.cell_sha256) refuse("another cell");
+  return program;
+}
+
+}  // namespace
+
+std::string run_plan(const PipelineRequest& request, const PipelineListener& listener) {
+  make_output_folder(request.output);
+  Stages stages(listener);
+  Workpiece piece(request, stages);
+  const Reach reach(piece.mesh, piece.cell, plan_options(piece.settings));
+  plan_work(piece, reach, request.output, stages);
+  return save_report(piece, stages, request.output);
+}
+
+std::string run_dry_run(const PipelineRequest& request, const PipelineListener& listener) {
+  make_output_folder(request.output);
+  Stages stages(listener);
+  Workpiece piece(request, stages);
+  const Reach reach(piece.mesh, piece.cell, plan_options(piece.settings));
+  const PlannedWork work = plan_work(piece, reach, request.output, stages);
+  const auto emissions = stages.run("execute", [&](const Progress& progress) {
+    return paint_in_simulation(work.plan.program, piece.cell, progress);
+  });
+  develop_and_judge(piece, reach, work, emissions, request.output, stages);
+  return save_report(piece, stages, request.output);
+}
+
+std::string run_develop(const PipelineRequest& request, const std::filesystem::path& program_file,
+                        const std::filesystem::path& emissions_file, const PipelineListener& listener) {
+  make_output_folder(request.output);
+  Stages stages(listener);
+  Workpiece piece(request, stages);
+  PlannedWork work;
+  work.plan.program = read_own_program(piece, program_file);
+  const DotCounts planned = dot_counts_from_report(program_file.parent_path() / "report.json");
+  const auto emissions = read_emission_record(emissions_file);
+
+  // Sampling is deterministic: the dots are made again rather than read, so that the mesh's report is whole too.
+  work.dots = sample_dots(piece, stages);
+  piece.report.dots = planned;
+  piece.report.pitch_m = work.plan.program.pitch_m;
+  piece.report.incidence = incidence_figures(work.plan.program);
+  piece.report.time = estimate_time(piece.cell, work.plan.program);
+  piece.report.files = {"report.json"};
+  const Reach reach(piece.mesh, piece.cell, plan_options(piece.settings));
+  develop_and_judge(piece, reach, work, emissions, request.output, stages);
+  return save_report(piece, stages, request.output);
+}
+
+std::vector<Joints> run_approach(const PipelineRequest& request, const std::filesystem::path& program_file,
+                                 std::size_t next, const Joints& from) {
+  const PipelineListener silent;
+  Stages stages(silent);
+  const Workpiece piece(request, stages);
+  const ExposureProgram program = read_own_program(piece, program_file);
+  if (next >= program.exposures.size())
+    throw InputError("--next", "is " + std::to_string(next) + ", but the program has " +
+                                   std::to_string(program.exposures.size()) + " exposures");
+  const Reach reach(piece.mesh, piece.cell, plan_options(piece.settings));
+  return plan_approach(reach, program, next, from);
+}
+
+std::vector<std::filesystem::path> run_files(const std::filesystem::path& model) {
+  return load_model(model, load_image_file).files;
+}
+
+}  // namespace hilbrush

@@ -8,9 +8,11 @@
 #include "planner/cell_description.h"
 
 /// Strings the stages together:
-///   load_model -> place_on_table -> repair_mesh -> SurfaceCurve -> place_dots -> plan_exposures -> check_program   (plan)
-///   -> execute on the simulated cell in virtual time -> Film -> fidelity, pictures                                   (dry_run)
-/// Each stage is one entry function of its folder, from a plain value to a plain value; nothing here edits a stage's result.
+///   load_model -> place_on_table -> repair_mesh -> SurfaceCurve -> place_dots -> plan_exposures -> check_program
+///   (plan)
+///   -> execute on the simulated cell in virtual time -> Film -> fidelity, pictures (dry_run)
+/// Each stage is one entry function of its folder, from a plain value to a plain value; nothing here edits a stage's
+/// result.
 namespace hilbrush {
 
 /// What a run is about; the same for every command.
@@ -38,13 +40,15 @@ std::string run_dry_run(const PipelineRequest& request, const PipelineListener& 
 
 /// Develops what a simulated cell recorded while it ran `program`: pictures, and report.json with the true counts.
 /// @throws InputError also if the program was made for another model, other settings or another cell.
-std::string run_develop(const PipelineRequest& request, const std::filesystem::path& program, const std::filesystem::path& emissions,
-                        const PipelineListener& listener);
+std::string run_develop(const PipelineRequest& request, const std::filesystem::path& program,
+                        const std::filesystem::path& emissions, const PipelineListener& listener);
 
 /// The checked way from measured joints to exposure `next`: way-points, possibly none.
-std::vector<Joints> run_approach(const PipelineRequest& request, const std::filesystem::path& program, std::size_t next, const Joints& from);
+std::vector<Joints> run_approach(const PipelineRequest& request, const std::filesystem::path& program, std::size_t next,
+                                 const Joints& from);
 
-/// Paints grey wedges on the cell's simulated film; writes tone_curve.json (an entry for paint.tone_curves of the cell file) and returns its text.
+/// Paints grey wedges on the cell's simulated film; writes tone_curve.json (an entry for paint.tone_curves of the cell
+/// file) and returns its text.
 std::string run_calibrate(const PipelineRequest& request, const PipelineListener& listener);
 
 /// Every file that reading the model reads: the model, inlines, material files, images.

@@ -1,1 +1,144 @@
-int main() { return 1; }
+// hilbrush-pipeline: everything that needs a mesh, as a child of `hilbrush` and `hilbrushd`.
+// It talks JSON lines on standard output:
+//   {"stage":"plan","fraction":0.4}   {"warning":"..."}   and last   {"result":{...}}   or
+//   {"error":{"at":"cup.wrl:12","message":"..."}}
+// Exit codes: 0 ok, 1 internal failure, 2 wrong usage, 3 bad input.
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <iostream>
+#include <new>
+#include <nlohmann/json.hpp>
+
+#include "config/cell_file.h"
+#include "daemon/pipeline.h"
+#include "planner/program_file.h"
+#include "sampling/input_error.h"
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+using namespace hilbrush;
+
+enum ExitCode { kOk = 0, kInternal = 1, kUsage = 2, kBadInput = 3 };
+
+void say(const Json& line) {
+  std::cout << line.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
+}
+
+/// Every change of stage, and within a stage ten lines a second at most.
+class ProgressLines {
+ public:
+  void operator()(const char* stage, double fraction) {
+    const auto now = std::chrono::steady_clock::now();
+    if (stage_ == stage && now - last_ < std::chrono::milliseconds(100)) return;
+    stage_ = stage;
+    last_ = now;
+    say({{"stage", stage}, {"fraction", fraction}});
+  }
+
+ private:
+  std::string stage_;
+  std::chrono::steady_clock::time_point last_;
+};
+
+struct Arguments {
+  std::string model, settings_json = "{}", cell, output, program, emissions;
+  std::vector<double> from;
+  std::size_t next = 0;
+};
+
+PipelineRequest request_of(const Arguments& arguments) {
+  PipelineRequest request;
+  request.model = arguments.model;
+  request.settings = job_settings_from_json(arguments.settings_json);
+  request.cell_file = arguments.cell.empty() ? find_cell(request.settings.cell) : find_cell(arguments.cell);
+  request.output = arguments.output;
+  return request;
+}
+
+Json run(const std::string& command, const Arguments& arguments, const PipelineListener& listener) {
+  if (command == "files") {
+    Json files = Json::array();
+    for (const auto& file : run_files(arguments.model)) files.push_back(file.string());
+    return {{"files", files}};
+  }
+  const PipelineRequest request = request_of(arguments);
+  if (command == "plan") return Json::parse(run_plan(request, listener));
+  if (command == "dry-run") return Json::parse(run_dry_run(request, listener));
+  if (command == "develop") return Json::parse(run_develop(request, arguments.program, arguments.emissions, listener));
+  if (command == "calibrate") return Json::parse(run_calibrate(request, listener));
+
+  Joints from{};
+  std::copy(arguments.from.begin(), arguments.from.end(), from.begin());
+  Json vias = Json::array();
+  for (const Joints& joints : run_approach(request, arguments.program, arguments.next, from)) vias.push_back(joints);
+  return {{"via", vias}};
+}
+
+int run_and_answer(const std::string& command, const Arguments& arguments) {
+  ProgressLines progress;
+  const PipelineListener listener{[&progress](const char* stage, double fraction) { progress(stage, fraction); },
+                                  [](const std::string& sentence) {
+                                    say({{"warning", sentence}});
+                                  }};
+  const auto fail = [](const std::string& at, const std::string& message, ExitCode code) {
+    say({{"error", {{"at", at}, {"message", message}}}});
+    return code;
+  };
+  try {
+    say({{"result", run(command, arguments, listener)}});
+    return kOk;
+  } catch (const InputError& error) {
+    return fail(error.at(), error.sentence(), kBadInput);
+  } catch (const ProgramFileError& error) {
+    return fail(arguments.program, error.what(), kBadInput);
+  } catch (const std::bad_alloc&) {
+    return fail(arguments.model, "the model needs more memory than there is", kInternal);
+  } catch (const std::exception& error) {
+    return fail("", error.what(), kInternal);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Hilbrush's pipeline: from a model to dots, poses, exposures and pictures. Run by hilbrush and hilbrushd; see "
+      "`hilbrush --help`."};
+  app.set_version_flag("--version", std::string("hilbrush-pipeline ") + HILBRUSH_VERSION);
+  app.require_subcommand(1);
+  Arguments arguments;
+
+  const auto add = [&](const char* name, const char* what, bool has_model, bool has_output) {
+    CLI::App* command = app.add_subcommand(name, what);
+    if (has_model) command->add_option("--model", arguments.model, "model file")->required();
+    if (std::string(name) != "files") {
+      command->add_option("--settings-json", arguments.settings_json, "job settings, a JSON object");
+      command->add_option("--cell", arguments.cell, "cell file or name (default: the settings' cell)");
+    }
+    if (has_output) command->add_option("--output", arguments.output, "folder for everything written")->required();
+    return command;
+  };
+  add("files", "list every file that reading the model reads", true, false);
+  add("plan", "write program.ply, dots.ply and report.json", true, true);
+  add("dry-run", "plan, paint on the simulated cell, develop", true, true);
+  CLI::App* develop = add("develop", "develop what a simulated cell recorded", true, true);
+  develop->add_option("--program", arguments.program, "program file")->required();
+  develop->add_option("--emissions", arguments.emissions, "the cell's record of emissions")->required();
+  add("calibrate", "make a tone curve from a wedge on the simulated film", false, true);
+  CLI::App* approach = add("approach", "plan the way from measured joints to an exposure", true, false);
+  approach->add_option("--program", arguments.program, "program file")->required();
+  approach->add_option("--next", arguments.next, "index of the exposure to reach")->required();
+  approach->add_option("--from", arguments.from, "j1,j2,j3,j4,a,c in rad and m")
+      ->required()
+      ->delimiter(',')
+      ->expected(kAxisCount);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUsage;
+  }
+  return run_and_answer(app.get_subcommands().front()->get_name(), arguments);
+}

@@ -70,8 +70,9 @@ Json dots_json(const DotCounts& dots) {
 }
 
 Json fidelity_json(const FidelityFigures& figures) {
-  return {{"f1_db", figure(figures.f1_db)},       {"f2_db", figure(figures.f2_db)},       {"s2", figure(figures.s2)},
-          {"tone_rms", figure(figures.tone_rms)}, {"tone_max", figure(figures.tone_max)}, {"p999", figure(figures.p999)}};
+  return {
+      {"f1_db", figure(figures.f1_db)},       {"f2_db", figure(figures.f2_db)},       {"s2", figure(figures.s2)},
+      {"tone_rms", figure(figures.tone_rms)}, {"tone_max", figure(figures.tone_max)}, {"p999", figure(figures.p999)}};
 }
 
 }  // namespace
@@ -87,7 +88,8 @@ IncidenceFigures incidence_figures(const ExposureProgram& program) {
   }
   std::sort(incidences.begin(), incidences.end());
   const std::size_t count = incidences.size();
-  return {sum / static_cast<double>(count) * kDegrees, incidences[(count - 1) * 95 / 100] * kDegrees, incidences.back() * kDegrees};
+  return {sum / static_cast<double>(count) * kDegrees, incidences[(count - 1) * 95 / 100] * kDegrees,
+          incidences.back() * kDegrees};
 }
 
 std::string report_to_json(const Report& report) {
@@ -137,7 +139,9 @@ std::string report_to_json(const Report& report) {
 
 DotCounts dot_counts_from_report(const std::filesystem::path& report_file) {
   std::ifstream in(report_file);
-  if (!in) throw InputError(report_file.string(), "can't be read; `develop` needs the report that `plan` wrote beside the program");
+  if (!in)
+    throw InputError(report_file.string(),
+                     "can't be read; `develop` needs the report that `plan` wrote beside the program");
   try {
     const Json dots = Json::parse(in).at("dots");
     DotCounts counts;

@@ -11,7 +11,8 @@
 #include "sampling/sample.h"
 #include "sim/film/fidelity.h"
 
-/// What one run of the pipeline found, as people and programs read it: report.json. Keys are stable: added, never renamed.
+/// What one run of the pipeline found, as people and programs read it: report.json. Keys are stable: added, never
+/// renamed.
 namespace hilbrush {
 
 /// Counts that add up: placed = exposed + in_doubt + remaining + the skipped ones.
