@@ -1,1 +1,248 @@
 #include "sampling/images/image_file.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <string_view>
+
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+using std::filesystem::path;
+
+constexpr int kLargestSide = 1 << 16;
+constexpr std::size_t kStripRows = 64;
+
+double srgb_to_linear(double encoded) {
+  return encoded <= .04045 ? encoded / 12.92 : std::pow((encoded + .055) / 1.055, 2.4);
+}
+
+/// Linear light of every 16-bit sRGB code; 8-bit codes are the multiples of 257.
+const std::vector<float>& linear_of_code() {
+  static const std::vector<float> table = [] {
+    std::vector<float> values(65536);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = static_cast<float>(srgb_to_linear(static_cast<double>(i) / 65535.));
+    return values;
+  }();
+  return table;
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+/// OpenImageIO's name of the file's format by its first bytes (TGA has no signature: by its ending), or empty. Choosing
+/// the plug-in ourselves keeps the hundred other formats it knows away from untrusted bytes.
+std::string format_name(const path& file, std::string_view head) {
+  const auto starts_with = [&](std::string_view magic) { return head.substr(0, magic.size()) == magic; };
+  if (starts_with("\x89PNG\r\n\x1a\n")) return "png";
+  if (starts_with("\xff\xd8\xff")) return "jpeg";
+  if (starts_with("GIF87a") || starts_with("GIF89a")) return "gif";
+  if (starts_with("BM")) return "bmp";
+  using namespace std::string_view_literals;
+  if (starts_with("II*\0"sv) || starts_with("MM\0*"sv) || starts_with("II+\0"sv) || starts_with("MM\0+"sv))
+    return "tiff";
+  const std::string ending = lower_case(file.extension().string());
+  if (ending == ".tga" || ending == ".tpic") return "targa";
+  return "";
+}
+
+/// libjpeg fills a truncated picture with grey and OpenImageIO calls that success; a whole one has an end marker after
+/// its last scan.
+bool is_truncated_jpeg(std::string_view bytes) {
+  using namespace std::string_view_literals;
+  const std::size_t scan = bytes.rfind("\xff\xda"sv);
+  return scan == std::string_view::npos || bytes.find("\xff\xd9"sv, scan) == std::string_view::npos;
+}
+
+std::optional<std::string> read_bytes(const path& file, std::size_t limit, std::string& reason) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (error || !std::filesystem::exists(status)) {
+    reason = "there is no such file";
+    return std::nullopt;
+  }
+  if (!std::filesystem::is_regular_file(status)) {
+    reason = "it is not a regular file";
+    return std::nullopt;
+  }
+  const auto size = std::filesystem::file_size(file, error);
+  if (error || size > limit) {
+    reason = error ? "its size can't be read" : "the file is larger than " + std::to_string(limit >> 20) + " MB";
+    return std::nullopt;
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes(size, '\0');
+  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    reason = "it can't be read";
+    return std::nullopt;
+  }
+  return bytes;
+}
+
+/// What is wrong with the header, or empty.
+std::string header_fault(const OIIO::ImageSpec& spec, std::size_t pixel_limit) {
+  if (spec.width < 1 || spec.height < 1 || spec.depth > 1) return "it is not a flat picture";
+  if (spec.width > kLargestSide || spec.height > kLargestSide ||
+      static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) > pixel_limit)
+    return "it has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
+           " pixels, more than the limit allows (" + std::to_string(pixel_limit) + " left)";
+  const std::string color_space = lower_case(spec.get_string_attribute("jpeg:ColorSpace"));
+  if (color_space == "cmyk" || color_space == "ycck" ||
+      lower_case(spec.get_string_attribute("tiff:ColorSpace")) == "cmyk")
+    return "its colours are CMYK, which have no agreed meaning on screen; save it as RGB";
+  if (spec.nchannels < 1 || spec.nchannels > 4)
+    return "it has " + std::to_string(spec.nchannels) + " channels; 1 to 4 are read";
+  return "";
+}
+
+/// Turns strips of interleaved channels into rows of the texture, bottom row first.
+class TextureFiller {
+ public:
+  TextureFiller(Texture& texture, bool is_linear) : texture_(texture), is_linear_(is_linear) {
+    const std::size_t count = static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height);
+    texture_.luminance.resize(count);
+    if (texture.channels % 2 == 0) texture_.opacity.resize(count);
+  }
+
+  void set(int x, int row_from_top, const std::uint16_t* codes) {
+    const std::vector<float>& table = linear_of_code();
+    const auto linear = [&](int c) { return table[codes[c]]; };
+    store(x, row_from_top, linear, codes[texture_.channels - 1] / 65535.f);
+  }
+  void set(int x, int row_from_top, const float* values) {
+    const auto clamped = [&](int c) { return std::isfinite(values[c]) ? std::clamp(values[c], 0.f, 1.f) : 0.f; };
+    const auto linear = [&](int c) { return is_linear_ ? clamped(c) : static_cast<float>(srgb_to_linear(clamped(c))); };
+    store(x, row_from_top, linear, clamped(texture_.channels - 1));
+  }
+  /// An image without a transparent pixel is opaque.
+  void finish() {
+    if (std::all_of(texture_.opacity.begin(), texture_.opacity.end(), [](float a) { return a >= 1; }))
+      texture_.opacity.clear();
+  }
+
+ private:
+  template <class Linear>
+  void store(int x, int row_from_top, const Linear& linear, float alpha) {
+    const std::size_t at =
+        static_cast<std::size_t>(texture_.height - 1 - row_from_top) * static_cast<std::size_t>(texture_.width) +
+        static_cast<std::size_t>(x);
+    texture_.luminance[at] =
+        texture_.channels < 3 ? linear(0) : .2126f * linear(0) + .7152f * linear(1) + .0722f * linear(2);
+    if (!texture_.opacity.empty()) texture_.opacity[at] = alpha;
+  }
+
+  Texture& texture_;
+  bool is_linear_;
+};
+
+template <class Value>
+bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, TextureFiller& filler) {
+  // A tiled file is read by whole rows of tiles.
+  const int step = spec.tile_height > 0 ? spec.tile_height : static_cast<int>(kStripRows);
+  if (step > kLargestSide || spec.tile_width > kLargestSide) return false;
+  const auto channels = static_cast<std::size_t>(spec.nchannels);
+  std::vector<Value> strip(static_cast<std::size_t>(std::min(step, spec.height)) *
+                           static_cast<std::size_t>(spec.width) * channels);
+  for (int y = 0; y < spec.height; y += step) {
+    const int end = std::min(y + step, spec.height);
+    const bool ok = spec.tile_width > 0 ? input.read_tiles(0, 0, spec.x, spec.x + spec.width, spec.y + y, spec.y + end,
+                                                           0, 1, 0, spec.nchannels, type, strip.data())
+                                        : input.read_scanlines(0, 0, spec.y + y, spec.y + end, 0, 0, spec.nchannels,
+                                                               type, strip.data());
+    if (!ok || input.has_error()) return false;
+    for (int row = y; row < end; ++row)
+      for (int x = 0; x < spec.width; ++x)
+        filler.set(x, row,
+                   &strip[(static_cast<std::size_t>(row - y) * static_cast<std::size_t>(spec.width) +
+                           static_cast<std::size_t>(x)) *
+                          channels]);
+  }
+  return true;
+}
+
+/// OpenImageIO's messages may span lines; a reason is one sentence.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+std::optional<Texture> load_image_file(const path& file, std::size_t pixel_limit, std::string& reason) {
+  static std::once_flag limits_set;
+  std::call_once(limits_set, [] { OIIO::attribute("limits:imagesize_MB", 1024); });
+
+  // No useful picture has more than 16 bytes a pixel in its file, but small ones may carry metadata.
+  const auto bytes =
+      read_bytes(file, (std::size_t{16} << 20) + 16 * std::min<std::size_t>(pixel_limit, 16u << 20), reason);
+  if (!bytes) return std::nullopt;
+  const std::string format = format_name(file, *bytes);
+  if (format.empty()) {
+    reason = "it is not a PNG, JPEG, GIF, TGA, BMP or TIFF picture";
+    return std::nullopt;
+  }
+  if (format == "jpeg" && is_truncated_jpeg(*bytes)) {
+    reason = "the JPEG picture is truncated";
+    return std::nullopt;
+  }
+  try {
+    auto input = OIIO::ImageInput::create(format);
+    OIIO::ImageSpec spec, config;
+    config["oiio:UnassociatedAlpha"] = 1;
+    if (!input || !input->open(file.string(), spec, config)) {
+      reason = "the " + format + " picture can't be read: " + one_line(input ? input->geterror() : OIIO::geterror());
+      return std::nullopt;
+    }
+    reason = header_fault(spec, pixel_limit);
+    if (!reason.empty()) return std::nullopt;
+    Texture texture;
+    texture.width = spec.width;
+    texture.height = spec.height;
+    texture.channels = spec.nchannels;
+    texture.name = file.filename().string();
+    const bool is_float = spec.format.is_floating_point();
+    TextureFiller filler(texture, is_float);
+    const bool ok = is_float ? read_rows<float>(*input, spec, OIIO::TypeDesc::FLOAT, filler)
+                             : read_rows<std::uint16_t>(*input, spec, OIIO::TypeDesc::UINT16, filler);
+    const std::string fault = input->geterror();
+    input->close();
+    if (!ok || !fault.empty()) {
+      reason = "the " + format + " picture is truncated or corrupt: " + one_line(fault);
+      return std::nullopt;
+    }
+    filler.finish();
+    return texture;
+  } catch (const std::exception& error) {
+    reason = std::string("the picture can't be read: ") + one_line(error.what());
+    return std::nullopt;
+  }
+}
+
+void save_png(const Picture& picture, const path& file) {
+  const std::size_t wanted = static_cast<std::size_t>(std::max(picture.width, 0)) *
+                             static_cast<std::size_t>(std::max(picture.height, 0)) *
+                             static_cast<std::size_t>(std::max(picture.channels, 0));
+  if (wanted == 0 || (picture.channels != 1 && picture.channels != 3) || picture.pixels.size() != wanted)
+    throw InputError(file.string(), "a picture of " + std::to_string(picture.width) + " x " +
+                                        std::to_string(picture.height) + " x " + std::to_string(picture.channels) +
+                                        " with " + std::to_string(picture.pixels.size()) + " bytes can't be written");
+  auto output = OIIO::ImageOutput::create("png");
+  OIIO::ImageSpec spec(picture.width, picture.height, picture.channels, OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:ColorSpace", "sRGB");
+  if (!output) throw InputError(file.string(), "can't be written: " + one_line(OIIO::geterror()));
+  const bool ok = output->open(file.string(), spec) &&
+                  output->write_image(OIIO::TypeDesc::UINT8, picture.pixels.data()) && output->close();
+  if (!ok) throw InputError(file.string(), "can't be written: " + one_line(output->geterror()));
+}
+
+}  // namespace hilbrush
