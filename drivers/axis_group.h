@@ -10,10 +10,10 @@
 ///   enable()   connected -> enabled: drives on; joints can be read.
 ///   home()     enabled -> ready: may move. A group that keeps its reference may be ready at once.
 ///   move_to()  ready -> moving -> ready when every axis is in position and settled.
-///   stop()     moving -> enabled-but-stopped (ready again at once): decelerates; from any thread, idempotent, never throws.
-///   disable()  any but disconnected -> connected.
-///   clear_fault() fault -> connected.
-/// Unless said otherwise, calls come from the executor's thread only, and throw DriverError on refusal, silence or fault.
+///   stop()     moving -> enabled-but-stopped (ready again at once): decelerates; from any thread, idempotent, never
+///   throws. disable()  any but disconnected -> connected. clear_fault() fault -> connected.
+/// Unless said otherwise, calls come from the executor's thread only, and throw DriverError on refusal, silence or
+/// fault.
 namespace hilbrush {
 
 enum class DeviceState { kDisconnected, kConnected, kEnabled, kReady, kMoving, kFault };
@@ -26,9 +26,9 @@ class AxisGroup {
 
   struct Status {
     DeviceState state = DeviceState::kDisconnected;
-    Positions positions{};          ///< measured
-    bool in_position = false;       ///< at the last target, settled
-    std::string fault;              ///< a sentence, if state is kFault
+    Positions positions{};     ///< measured
+    bool in_position = false;  ///< at the last target, settled
+    std::string fault;         ///< a sentence, if state is kFault
   };
 
   virtual ~AxisGroup() = default;
@@ -37,12 +37,14 @@ class AxisGroup {
   virtual void home() = 0;
   virtual void disable() noexcept = 0;
   virtual void clear_fault() = 0;
-  /// Starts a move of all axes to `target` and returns. Refuses targets outside the device's own limits, and when not ready.
-  /// `settle_s`: how long the axes must have been at rest before in_position is reported, as the time model foresees.
+  /// Starts a move of all axes to `target` and returns. Refuses targets outside the device's own limits, and when not
+  /// ready. `settle_s`: how long the axes must have been at rest before in_position is reported, as the time model
+  /// foresees.
   virtual void move_to(const Positions& target, double settle_s) = 0;
   /// From any thread.
   virtual Status status() = 0;
-  /// The device's own estimate of when in_position can become true, on the cell's clock; a hint for polling. now if unknown.
+  /// The device's own estimate of when in_position can become true, on the cell's clock; a hint for polling. now if
+  /// unknown.
   virtual double expected_arrival_s() = 0;
   /// From any thread, idempotent, never throws.
   virtual void stop() noexcept = 0;

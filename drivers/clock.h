@@ -2,14 +2,16 @@
 
 namespace hilbrush {
 
-/// Time as the executor and the devices share it, in seconds of the cell. Real cells: the steady clock. Simulated cells: scaled or virtual.
+/// Time as the executor and the devices share it, in seconds of the cell. Real cells: the steady clock. Simulated
+/// cells: scaled or virtual.
 class Clock {
  public:
   virtual ~Clock() = default;
   virtual double now_s() const = 0;
   /// Blocks until now_s() >= time_s, or wake() is called. Any one thread may sleep.
   virtual void sleep_until(double time_s) = 0;
-  /// Ends a sleep early; may be called from any thread.
+  /// Ends a sleep early; may be called from any thread. A wake() that finds nobody asleep ends the next sleep at once,
+  /// so that a thread which looks at a flag and then goes to sleep misses nothing.
   virtual void wake() = 0;
 };
 

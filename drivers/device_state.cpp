@@ -4,12 +4,18 @@ namespace hilbrush {
 
 const char* device_state_name(DeviceState state) {
   switch (state) {
-    case DeviceState::kDisconnected: return "disconnected";
-    case DeviceState::kConnected: return "connected";
-    case DeviceState::kEnabled: return "enabled";
-    case DeviceState::kReady: return "ready";
-    case DeviceState::kMoving: return "moving";
-    case DeviceState::kFault: return "fault";
+    case DeviceState::kDisconnected:
+      return "disconnected";
+    case DeviceState::kConnected:
+      return "connected";
+    case DeviceState::kEnabled:
+      return "enabled";
+    case DeviceState::kReady:
+      return "ready";
+    case DeviceState::kMoving:
+      return "moving";
+    case DeviceState::kFault:
+      return "fault";
   }
   return "unknown";
 }

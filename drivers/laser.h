@@ -3,8 +3,9 @@
 
 #include "drivers/axis_group.h"
 
-/// The laser in two halves: *enable* (key, interlock, emission armed once per job) and *gate* (one dot's pulse, timed by the device).
-/// Life cycle: disconnected -> connected -> enabled (start delay is paid here) -> ready; emitting counts as moving; any -> fault.
+/// The laser in two halves: *enable* (key, interlock, emission armed once per job) and *gate* (one dot's pulse, timed
+/// by the device). Life cycle: disconnected -> connected -> enabled (start delay is paid here) -> ready; emitting
+/// counts as moving; any -> fault.
 namespace hilbrush {
 
 class Laser {
