@@ -9,11 +9,12 @@
 #include "drivers/cell.h"
 #include "planner/exposure_program.h"
 
-/// Runs an exposure program on a cell: the only code that commands motion. One exposure: vias, move, in position and settled on both chains,
-/// journal armed, pulse, laser proved off, journal done. The laser is off before every move, and on every way out.
+/// Runs an exposure program on a cell: the only code that commands motion. One exposure: vias, move, in position and
+/// settled on both chains, journal armed, pulse, laser proved off, journal done. The laser is off before every move,
+/// and on every way out.
 namespace hilbrush {
 
-/// How other threads reach a running executor. request_stop() also has the laser turned off and the axes stopped by the caller, at once.
+/// How other threads reach a running executor; request_stop() sets `stop` and acts on the devices at once.
 struct ExecutionControl {
   std::atomic<bool> stop{false};   ///< latched by the owner
   std::atomic<bool> pause{false};  ///< ends between two exposures
@@ -30,9 +31,19 @@ struct ExecutionResult {
 
 using ExecutionProgress = std::function<void(std::size_t exposures_done)>;
 
-/// Connects nothing: the devices must be ready and the laser enabled. `approach`: way-points before the first exposure still to make, replacing
-/// the program's vias there. Exposures whose journal state is not kRemaining are passed over. Never throws.
-ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints>& approach, const Cell& cell, const CellDescription& description,
-                        Journal& journal, ExecutionControl& control, const ExecutionProgress& progress = {});
+/// Connects nothing: the devices must be ready and the laser enabled. `approach`: way-points before the first exposure
+/// still to make, replacing the program's vias there; ignored if none is left. Exposures whose journal state is not
+/// kRemaining are not exposed; those between two that are get their poses visited in the dark, because only the way
+/// through them was checked. Limits of every pose, power and pulse are checked again here. Virtual time: about a
+/// microsecond an exposure on top of the devices'. Executor's thread only. Never throws.
+ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints>& approach, const Cell& cell,
+                        const CellDescription& description, Journal& journal, ExecutionControl& control,
+                        const ExecutionProgress& progress = {});
+
+/// Stops whatever runs, from any thread, in this order: the flag (so that no new pulse is begun), the gate off,
+/// emission disabled (so that a pulse that was just being ordered is refused), the axes, the executor's sleep.
+/// Idempotent, never throws.
+/// @return true if the laser confirmed that it is off.
+bool request_stop(const Cell& cell, ExecutionControl& control) noexcept;
 
 }  // namespace hilbrush

@@ -6,24 +6,44 @@
 #include <string>
 #include <vector>
 
-/// Which exposures are done: the memory of a painting job that must survive everything (DESIGN invariant 3: no dot is exposed twice).
-/// Allocated in full before the job starts; arm(i) and done(i) go to memory-mapped storage, so a killed process leaves at most one exposure in
-/// doubt; before the first exposure of a window the opening of the window is synced to disk, so a power cut leaves at most one window in doubt.
+/// Which exposures are done: the memory of a painting job that must survive everything (no dot is exposed twice).
+///
+/// File: a header page (magic, version, count, program, boot), one 8-byte record a window, one 8-byte record an
+/// exposure; every record carries a checksum over its state and place. Written in full before the job starts, so that a
+/// full disk is found before the first dot. Afterwards records are changed in memory-mapped storage, each by one atomic
+/// store: a killed process leaves every record whole, and at most one exposure armed. Before the first exposure of a
+/// window of kWindow is armed, the window's opening is synced to disk; a window is closed only after its records are.
+/// So after a power cut (the machine's boot id has changed) at most one window is open, and its exposures without a
+/// durable *done* are in doubt: at most kWindow. A record whose checksum is wrong is in doubt, too. One thread at a
+/// time; one process at a time (the file is locked).
 namespace hilbrush {
 
 enum class ExposureState : std::uint8_t { kRemaining = 0, kArmed = 1, kDone = 2, kInDoubt = 3 };
 
 class Journal {
  public:
+  static constexpr std::size_t kWindow =
+      256;  ///< exposures, about 8 s of painting: two syncs in that time cost nothing
+
   /// For dry runs: nothing is kept.
   static Journal in_memory(std::size_t exposure_count);
-  /// @throws std::runtime_error naming the file (exists already, disk full, ...).
-  static Journal create(const std::filesystem::path& file, std::size_t exposure_count, const std::string& program_sha256);
-  /// Reopens after a stop, kill or power cut: armed exposures become in doubt. @throws std::runtime_error if damaged or of another program.
-  static Journal open(const std::filesystem::path& file, const std::string& program_sha256);
+  /// The file appears under its name only when it is whole. @throws std::runtime_error naming the file (exists already,
+  /// disk full, ...).
+  static Journal create(const std::filesystem::path& file, std::size_t exposure_count,
+                        const std::string& program_sha256);
+  /// Reopens after a stop, kill or power cut: armed exposures become in doubt. `boot_id` identifies this run of the
+  /// machine; tests pass another one to play a power cut. @throws std::runtime_error if it can't be read, is in use, is
+  /// damaged in its header, or is of another program.
+  static Journal open(const std::filesystem::path& file, const std::string& program_sha256,
+                      const std::string& boot_id = current_boot_id());
+  /// Of the running kernel; empty if it can't be told, which open() takes for a power cut.
+  static std::string current_boot_id();
+  /// Syncs and closes the open window.
   ~Journal();
   Journal(Journal&&) noexcept;
 
+  /// The exposure must be kRemaining: that no dot is exposed twice is an invariant, not a hope. @throws
+  /// std::runtime_error if syncing fails.
   void arm(std::size_t i);
   void done(std::size_t i);
   /// An exposure whose pulse may have happened, wholly or in part.
@@ -31,9 +51,14 @@ class Journal {
   /// The operator orders an in-doubt exposure again.
   void expose_again(std::size_t i);
 
+  /// Makes everything so far survive a power cut, and closes the open window: at every end of a run. @throws
+  /// std::runtime_error
+  void close_window();
+
   ExposureState state(std::size_t i) const;
   std::size_t exposure_count() const;
-  std::size_t done_count() const;
+  std::size_t done_count() const;  ///< O(1)
+  /// Ascending. Cost: O(exposures).
   std::vector<std::size_t> in_doubt() const;
 
  private:
