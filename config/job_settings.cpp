@@ -1,1 +1,117 @@
 #include "config/job_settings.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <vector>
+
+#include "config/json_reader.h"
+
+namespace hilbrush {
+namespace {
+
+constexpr double kDefaultDpi = 100;
+constexpr double kInch_m = 0.0254;
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::uint64_t kDotsMax = 50'000'000;
+constexpr std::size_t kSettingsBytesMax = 64u << 10;
+
+const std::vector<std::string> kSamplerNames{"centroid", "jittered", "even", "random"};
+const std::vector<std::string> kUntexturedNames{"auto", "blank", "material"};
+const std::vector<std::string> kCurveNames{"hilbert"};
+const std::vector<std::string> kUpNames{"y", "z"};
+
+/// How many dots and how large: of each pair at most one.
+void read_amounts(JsonObject& json, JobSettings& settings) {
+  settings.dpi = json.optional_number("dpi", {10, 1200});
+  settings.dots = json.optional_integer("dots", 1, kDotsMax);
+  settings.size_mm = json.optional_number("size_mm", {1, 1000});
+  settings.units_mm = json.optional_number("units_mm", {1e-6, 1e6});
+  if (settings.dpi && settings.dots) json.refuse("dots", "contradicts dpi: give dpi or dots, not both");
+  if (settings.size_mm && settings.units_mm)
+    json.refuse("units_mm", "contradicts size_mm: give size_mm or units_mm, not both");
+  if (!settings.dpi && !settings.dots) settings.dpi = kDefaultDpi;
+}
+
+void read_incidence(JsonObject& json, JobSettings& settings) {
+  settings.max_incidence_deg = json.optional_number("max_incidence_deg", {1, 45}).value_or(settings.max_incidence_deg);
+  const std::optional<double> preferred = json.optional_number("preferred_incidence_deg", {0, 45});
+  if (preferred && *preferred > settings.max_incidence_deg)
+    json.refuse("preferred_incidence_deg", "above max_incidence_deg");
+  settings.preferred_incidence_deg =
+      preferred.value_or(std::min(settings.preferred_incidence_deg, settings.max_incidence_deg));
+}
+
+JobSettings read_settings(JsonObject& json) {
+  JobSettings settings;
+  read_amounts(json, settings);
+  if (const auto up = json.optional_choice("up", kUpNames)) settings.up = kUpNames[*up];
+  if (const auto choice = json.optional_choice("untextured", kUntexturedNames))
+    settings.untextured = static_cast<Untextured>(*choice);
+  if (const auto choice = json.optional_choice("sampler", kSamplerNames))
+    settings.sampler = static_cast<Sampler>(*choice);
+  if (const auto choice = json.optional_choice("curve", kCurveNames)) settings.curve = kCurveNames[*choice];
+  settings.seed = json.optional_integer("seed", 0, UINT64_MAX).value_or(settings.seed);
+  read_incidence(json, settings);
+  settings.cell = json.optional_text("cell", 4096).value_or(settings.cell);
+  settings.dry_run = json.optional_boolean("dry_run").value_or(settings.dry_run);
+  return settings;
+}
+
+template <class T>
+nlohmann::ordered_json or_null(const std::optional<T>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+}
+
+}  // namespace
+
+JobSettings job_settings_from_json(const std::string& text, const std::string& origin) {
+  JobSettings settings;
+  read_json_object(text, origin, [&](JsonObject& json) { settings = read_settings(json); },
+                   {.bytes = kSettingsBytesMax, .depth = 4});
+  return settings;
+}
+
+std::string job_settings_to_json(const JobSettings& settings) {
+  // What stands in for an unset dpi is written out, so that equal jobs have equal text.
+  const std::optional<double> dpi = settings.dpi || settings.dots ? settings.dpi : std::optional<double>(kDefaultDpi);
+  const nlohmann::ordered_json json{{"dpi", or_null(dpi)},
+                                    {"dots", or_null(settings.dots)},
+                                    {"size_mm", or_null(settings.size_mm)},
+                                    {"units_mm", or_null(settings.units_mm)},
+                                    {"up", or_null(settings.up)},
+                                    {"untextured", untextured_name(settings.untextured)},
+                                    {"sampler", sampler_name(settings.sampler)},
+                                    {"curve", settings.curve},
+                                    {"seed", settings.seed},
+                                    {"max_incidence_deg", settings.max_incidence_deg},
+                                    {"preferred_incidence_deg", settings.preferred_incidence_deg},
+                                    {"cell", settings.cell},
+                                    {"dry_run", settings.dry_run}};
+  return json.dump();
+}
+
+const char* sampler_name(Sampler sampler) {
+  return kSamplerNames[static_cast<std::size_t>(sampler)].c_str();
+}
+
+const char* untextured_name(Untextured untextured) {
+  return kUntexturedNames[static_cast<std::size_t>(untextured)].c_str();
+}
+
+SampleOptions sample_options(const JobSettings& settings) {
+  SampleOptions options;
+  options.dot_count = settings.dots;
+  if (!settings.dots) options.pitch_m = kInch_m / settings.dpi.value_or(kDefaultDpi);
+  options.sampler = settings.sampler;
+  options.seed = settings.seed;
+  options.dot_limit = kDotsMax;
+  return options;
+}
+
+PlanOptions plan_options(const JobSettings& settings) {
+  return {.max_incidence = settings.max_incidence_deg * kDegree,
+          .preferred_incidence = settings.preferred_incidence_deg * kDegree};
+}
+
+}  // namespace hilbrush
