@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -9,10 +10,9 @@
 #include <numbers>
 #include <numeric>
 #include <sstream>
+#include <stdexcept>
 #include <string_view>
 #include <system_error>
-
-#include "sampling/check.h"
 
 namespace hilbrush {
 namespace {
@@ -40,7 +40,7 @@ constexpr std::array<Unit, 10> kUnits{{{"_deg_s2", kDegree},
 double unit_of(const std::string& key) {
   for (const Unit& unit : kUnits)
     if (key.ends_with(unit.suffix)) return unit.si;
-  check_failed(__FILE__, __LINE__, "key without a unit: " + key);
+  throw std::logic_error("key without a unit: " + key);  // a mistake of the reading code, not of the file
 }
 
 /// Degrees and thousandths are divided or multiplied so that 0.1 mm and 1e-4 m are the same double.
