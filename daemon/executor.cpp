@@ -51,8 +51,10 @@ class Run {
   void check_pulse(const Exposure& exposure, std::size_t i) const;
   void prove_laser_off();
   void end_if_asked() const;
-  void move(const Joints& target, double settle);
+  enum class Rest { kPassing, kSettled };
+  void move(const Joints& target, Rest rest);
   void wait_in_position(double deadline_s);
+  void visit_approach(const std::vector<Joints>& approach);
   void visit_vias(std::size_t i);
   void expose(std::size_t i);
   void wait_pulse_end(const Exposure& exposure);
@@ -67,6 +69,7 @@ class Run {
   Joints at_{};                                   ///< where the last finished move ended
   std::optional<Robot::Positions> robot_target_;  ///< what each chain was last told in this run
   std::optional<Table::Positions> table_target_;
+  double rung_down_s_ = 0;  ///< when what was passed without settling will be at rest, on the cell's clock
   std::size_t next_via_ = 0;
   std::size_t exposed_ = 0;
 };
@@ -123,20 +126,27 @@ void Run::check_pulse(const Exposure& exposure, std::size_t i) const {
                       " s, outside the laser's limits");
 }
 
-/// Both chains start together; a chain that stays where it is isn't commanded again, its in_position is still required.
-void Run::move(const Joints& target, double settle) {
+/// Both chains start together. A chain that rests where it shall be isn't commanded again, but its in_position is
+/// required. Way-points are passed without waiting for the axes to ring down, so what is left of that is added to the
+/// settling of the move that ends in an exposure.
+void Run::move(const Joints& target, Rest rest) {
   end_if_asked();
   prove_laser_off();
-  const double deadline_s = cell_.clock.now_s() + 2 * move_s(description_, at_, target) + settle + kGraceS;
+  const double now_s = cell_.clock.now_s();
+  const double travel_s = move_s(description_, at_, target);
+  const double ring_s = std::max(settle_s(description_, at_, target), rung_down_s_ - (now_s + travel_s));
+  const double settle = rest == Rest::kSettled ? ring_s : 0;
   const auto robot_target = robot_part(target);
   const auto table_target = table_part(target);
-  const bool moves_robot = robot_target_ != robot_target;
-  const bool moves_table = table_target_ != table_target;
+  const bool is_ringing = rung_down_s_ > now_s;
+  const bool moves_robot = is_ringing || robot_target_ != robot_target;
+  const bool moves_table = is_ringing || table_target_ != table_target;
   robot_target_ = robot_target;
   table_target_ = table_target;
   if (moves_robot) cell_.robot.move_to(robot_target, settle);
   if (moves_table) cell_.table.move_to(table_target, settle);
-  wait_in_position(deadline_s);
+  wait_in_position(now_s + 2 * travel_s + settle + kGraceS);
+  rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + ring_s;
   at_ = target;
 }
 
@@ -160,10 +170,17 @@ void Run::wait_in_position(double deadline_s) {
   }
 }
 
+void Run::visit_approach(const std::vector<Joints>& approach) {
+  for (const Joints& via : approach) {
+    check_pose(via, 0);
+    move(via, Rest::kPassing);
+  }
+}
+
 void Run::visit_vias(std::size_t i) {
   for (; next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= i; ++next_via_) {
     check_pose(program_.vias[next_via_].joints, i);
-    move(program_.vias[next_via_].joints, 0);
+    move(program_.vias[next_via_].joints, Rest::kPassing);
   }
 }
 
@@ -216,36 +233,28 @@ void Run::expose(std::size_t i) {
 void Run::expose_all(const std::vector<Joints>& approach, const ExecutionProgress& progress) {
   check_ready();
   const std::size_t count = program_.exposures.size();
-  std::size_t last = count;  // one after the last exposure still to make
-  while (last > 0 && journal_.state(last - 1) != ExposureState::kRemaining) --last;
   std::size_t first = 0;
-  while (first < last && journal_.state(first) != ExposureState::kRemaining) ++first;
-  while (next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= first && first < last)
-    ++next_via_;
-  while (next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure < last && first >= last)
-    ++next_via_;
+  while (first < count && journal_.state(first) != ExposureState::kRemaining) ++first;
+  if (first == count) return;
+  while (next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= first) ++next_via_;
 
-  for (std::size_t i = first; i < last; ++i) {
+  for (std::size_t i = first; i < count; ++i) {
     end_if_asked();
     if (control_.pause.load()) throw RunEnded{ExecutionOutcome::kPaused};
     const bool is_exposed = journal_.state(i) == ExposureState::kRemaining;
     const Joints& target = program_.exposures[i].joints;
     check_pose(target, i);
     if (is_exposed) check_pulse(program_.exposures[i], i);
-    if (i == first) {
-      for (const Joints& via : approach) {
-        check_pose(via, i);
-        move(via, 0);
-      }
-    } else {
+    if (i == first)
+      visit_approach(approach);
+    else
       visit_vias(i);
-    }
-    move(target, is_exposed ? settle_s(description_, at_, target) : 0);
+    move(target, is_exposed ? Rest::kSettled : Rest::kPassing);
     if (!is_exposed) continue;
     expose(i);
     if (progress) progress(journal_.done_count());
   }
-  if (first < last) visit_vias(count);  // the way home
+  visit_vias(count);  // the way home
 }
 
 /// The laser first, then motion; both, whatever the other answers.
@@ -281,6 +290,19 @@ ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints
   result.elapsed_s = cell.clock.now_s() - begin_s;
   result.exposed = run.exposed();
   return result;
+}
+
+void bring_up(const Cell& cell) {
+  const auto ready = [](auto& axes) {
+    if (axes.status().state == DeviceState::kDisconnected) axes.connect();
+    if (axes.status().state == DeviceState::kConnected) axes.enable();
+    if (axes.status().state == DeviceState::kEnabled) axes.home();
+  };
+  if (cell.laser.status().state == DeviceState::kDisconnected) cell.laser.connect();
+  if (!cell.laser.off()) throw DriverError("the laser does not confirm that it is off");
+  ready(cell.robot);
+  ready(cell.table);
+  if (cell.laser.status().state == DeviceState::kConnected) cell.laser.enable();
 }
 
 bool request_stop(const Cell& cell, ExecutionControl& control) noexcept {

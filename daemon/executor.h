@@ -40,6 +40,10 @@ ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints
                         const CellDescription& description, Journal& journal, ExecutionControl& control,
                         const ExecutionProgress& progress = {});
 
+/// Everything from disconnected to ready, the laser armed; what is there already stays as it is. For dry runs and
+/// tests: on a real cell these are separate acts of the operator. @throws DriverError
+void bring_up(const Cell& cell);
+
 /// Stops whatever runs, from any thread, in this order: the flag (so that no new pulse is begun), the gate off,
 /// emission disabled (so that a pulse that was just being ordered is refused), the axes, the executor's sleep.
 /// Idempotent, never throws.

@@ -1,0 +1,95 @@
+#pragma once
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include "planner/cell_description.h"
+#include "planner/exposure_program.h"
+
+/// Cells and programs small enough to reason about: no mesh, no planner; positions follow from nothing but the joints.
+namespace hilbrush::test {
+
+inline CellDescription small_cell(double time_scale = 0) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  CellDescription cell;
+  cell.name = "small";
+  cell.sha256 = std::string(64, 'c');
+  const auto axis = [](double min, double max, double speed, double acceleration, double saturation, double home) {
+    return AxisDescription{min, max, speed, acceleration, saturation, home};
+  };
+  cell.axes[kJ1] = axis(-132 * kDegree, 132 * kDegree, 720 * kDegree, 8000 * kDegree, 10 * kDegree, 0.5);
+  cell.axes[kJ2] = axis(-150 * kDegree, 150 * kDegree, 720 * kDegree, 14000 * kDegree, 10 * kDegree, 0.5);
+  cell.axes[kJ3] = axis(0, .3, 1.1, 18, .02, .1);
+  cell.axes[kJ4] = axis(-2 * std::numbers::pi, 2 * std::numbers::pi, 45, 430, .8, 0);
+  cell.axes[kTilt] = axis(-.2, 1.8, 2, 20, .17, 0);
+  cell.axes[kRotation] = axis(-60, 60, 4.7, 47, .26, 0);
+  cell.laser.power_min_w = 1e-3;
+  cell.laser.power_max_w = .2;
+  cell.laser.pulse_min_s = 1e-3;
+  cell.laser.pulse_max_s = .05;
+  cell.laser.pulse_s = .005;
+  cell.timing = {.tick_s = .004, .settle_min_s = .02, .settle_max_s = .12, .retract_s = .12, .message_s = 0};
+  cell.simulation.time_scale = time_scale;
+  return cell;
+}
+
+/// Small steps of the arm, a table move every 50 exposures with two way-points before it, a way home. Each exposure's
+/// joints are its own.
+inline ExposureProgram small_program(std::size_t count, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> step(-.004, .004);
+  ExposureProgram program;
+  program.provenance = {std::string(64, 'a'), std::string(64, 'b'), std::string(64, 'c'), "test"};
+  program.pitch_m = 254e-6;
+  Joints at{.5, .5, .1, 0, 0, 0};
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i % 50 == 0 && i > 0) {
+      at[kJ3] = .15;
+      program.vias.push_back({static_cast<std::uint32_t>(i), at});
+      at[kRotation] += .3 * (i / 50 % 2 == 0 ? 1 : -1);
+      at[kTilt] = .1 * static_cast<double>(i / 50 % 5);
+      program.vias.push_back({static_cast<std::uint32_t>(i), at});
+      at[kJ3] = .1;
+    }
+    for (int axis : {kJ1, kJ2, kJ4})
+      at[static_cast<std::size_t>(axis)] = std::clamp(at[static_cast<std::size_t>(axis)] + step(random), -1.5, 1.5);
+    at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .05, .14);
+    Exposure exposure;
+    exposure.position_O = {1e-3 * static_cast<double>(i % 100), 1e-3 * static_cast<double>(i / 100), .05};
+    exposure.normal_O = {0, 0, 1};
+    exposure.tone = .5f;
+    exposure.power_w = .01f;
+    exposure.pulse_s = .005f;
+    exposure.energy_j = exposure.power_w * exposure.pulse_s;
+    exposure.joints = at;
+    exposure.dot_index = static_cast<std::uint32_t>(i);
+    program.exposures.push_back(exposure);
+  }
+  program.vias.push_back({static_cast<std::uint32_t>(count), Joints{.5, .5, .1, 0, 0, 0}});
+  return program;
+}
+
+/// A folder of its own, gone with the test.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "hilbrush-test-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace hilbrush::test
