@@ -1,20 +1,19 @@
 #pragma once
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
 /// The robot cell as data, read from config/cells/*.json. SI units.
 ///
-/// Frames: W world = B robot base, +z up, J1's axis at the origin, the table on +x. F flange. T tool: origin at the focus, +z along the beam.
-/// R table; O object: on the fixture's post, +z along the C axis, z = 0 at the post's top.
+/// Frames: W world = B robot base, +z up, J1's axis at the origin, the table on +x. F flange. T tool: origin at the
+/// focus, +z along the beam. R table; O object: on the fixture's post, +z along the C axis, z = 0 at the post's top.
 /// Arm (SCARA): J1, J2 revolute about z, J3 prismatic (the flange's height), J4 revolute about z. yaw = J1 + J2 + J4.
-/// Beam direction in W: (cos e cos yaw, cos e sin yaw, -sin e) with e the beam depression; the focus lies `flange_to_focus_m` along it
-/// from the flange's centre.
-/// Table: tilt A about the axis through `tilt_axis_W` along -y (A > 0 brings the object's top towards the robot, -x), then rotation C about
-/// the tilted z: X_WO = T(tilt_axis_W) * Ry(-A) * T(0, 0, plate_height_m + post_height_m) * Rz(C).
+/// Beam direction in W: (cos e cos yaw, cos e sin yaw, -sin e) with e the beam depression; the focus lies
+/// `flange_to_focus_m` along it from the flange's centre. Table: tilt A about the axis through `tilt_axis_W` along -y
+/// (A > 0 brings the object's top towards the robot, -x), then rotation C about the tilted z: X_WO = T(tilt_axis_W) *
+/// Ry(-A) * T(0, 0, plate_height_m + post_height_m) * Rz(C).
 namespace hilbrush {
 
 inline constexpr int kAxisCount = 6;
@@ -24,11 +23,11 @@ using Joints = std::array<double, kAxisCount>;
 inline constexpr std::array<const char*, kAxisCount> kAxisNames{"j1", "j2", "j3", "j4", "a", "c"};
 
 struct AxisDescription {
-  double min = 0, max = 0;          ///< rad or m
-  double speed_max = 0;             ///< rad/s or m/s
-  double acceleration_max = 0;      ///< rad/s2 or m/s2
-  double settle_saturation = 0;     ///< the move at which settling takes longest, rad or m
-  double home = 0;                  ///< where homing ends
+  double min = 0, max = 0;       ///< rad or m
+  double speed_max = 0;          ///< rad/s or m/s
+  double acceleration_max = 0;   ///< rad/s2 or m/s2
+  double settle_saturation = 0;  ///< the move at which settling takes longest, rad or m
+  double home = 0;               ///< where homing ends
 };
 
 /// How paint answers to x = dose / full dose; coverage in 0..1.
@@ -40,7 +39,7 @@ enum class PaintResponse {
 
 /// A calibrated tone curve and what it was made for.
 struct ToneCurveEntry {
-  std::string sampler;             ///< the placement's name, as in a job's settings
+  std::string sampler;  ///< the placement's name, as in a job's settings
   std::vector<double> wanted, asked;
 };
 
@@ -49,20 +48,20 @@ struct CellDescription {
   std::string sha256;  ///< of the file's bytes, as the provenance of programs names it
 
   std::array<AxisDescription, kAxisCount> axes;
-  double limit_margin = 0;          ///< fraction of each axis's range that planning keeps free at both ends
+  double limit_margin = 0;  ///< fraction of each axis's range that planning keeps free at both ends
 
   struct Arm {
     double upper_arm_m = 0, forearm_m = 0;
-    double beam_depression = 0;     ///< rad
+    double beam_depression = 0;  ///< rad
     double flange_to_focus_m = 0;
-    double quill_radius_m = 0;      ///< the vertical shaft above the flange
+    double quill_radius_m = 0;  ///< the vertical shaft above the flange
   } arm;
-  struct Lens {                     ///< a cylinder around the beam, behind the focus
+  struct Lens {  ///< a cylinder around the beam, behind the focus
     double radius_m = 0, near_m = 0, far_m = 0;
   } lens;
   struct Table {
     Eigen::Vector3d tilt_axis_W = Eigen::Vector3d::Zero();
-    double plate_height_m = 0;      ///< of the plate's top above the tilt axis at A = 0; may be negative
+    double plate_height_m = 0;  ///< of the plate's top above the tilt axis at A = 0; may be negative
     double plate_radius_m = 0, plate_thickness_m = 0;
   } table;
   struct Fixture {
@@ -71,28 +70,29 @@ struct CellDescription {
   struct Laser {
     double power_min_w = 0, power_max_w = 0;
     double pulse_min_s = 0, pulse_max_s = 0;
-    double pulse_s = 0;                         ///< preferred; stretched only when power_max_w is not enough
-    std::optional<double> spot_diameter_m;      ///< 1/e2, or
-    double spot_pitches = 1.41;                 ///< in pitches
+    double pulse_s = 0;                     ///< preferred; stretched only when power_max_w is not enough
+    std::optional<double> spot_diameter_m;  ///< 1/e2, or
+    double spot_pitches = 1.41;             ///< in pitches
   } laser;
   struct Paint {
     PaintResponse response = PaintResponse::kSaturating;
     double reflectance_white = 1, reflectance_black = 0;
-    double dose_full_j_m2 = 0;                  ///< x = 1: one dot's energy over one pitch squared
-    double asked_max = 1;                       ///< the largest coverage a tone curve may ask for
+    double dose_full_j_m2 = 0;  ///< x = 1: one dot's energy over one pitch squared
+    double asked_max = 1;       ///< the largest coverage a tone curve may ask for
     std::vector<ToneCurveEntry> tone_curves;
   } paint;
   struct Timing {
-    double tick_s = 0;                          ///< control tick
-    double settle_min_s = 0, settle_max_s = 0;  ///< settle = min + (max - min) * min(1, largest move / settle_saturation)
-    double retract_s = 0;                       ///< backing off and coming back around a re-pose
-    double message_s = 0;                       ///< what one exchange with the devices costs
+    double tick_s = 0;  ///< control tick
+    double settle_min_s = 0,
+           settle_max_s = 0;  ///< settle = min + (max - min) * min(1, largest move / settle_saturation)
+    double retract_s = 0;     ///< backing off and coming back around a re-pose
+    double message_s = 0;     ///< what one exchange with the devices costs
   } timing;
-  struct Devices {                              ///< driver names
+  struct Devices {  ///< driver names
     std::string robot, table, laser;
   } devices;
   struct Simulation {
-    double time_scale = 0;                      ///< wall seconds of one cell second: 1 real time, 0 virtual (as fast as possible)
+    double time_scale = 0;  ///< wall seconds of one cell second: 1 real time, 0 virtual (as fast as possible)
   } simulation;
 };
 

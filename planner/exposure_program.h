@@ -1,11 +1,10 @@
 #pragma once
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "planner/cell_description.h"
 
@@ -13,17 +12,18 @@
 namespace hilbrush {
 
 struct Exposure {
-  Eigen::Vector3d position_O;   ///< where the beam shall land, m
-  Eigen::Vector3f normal_O;     ///< of the face there
-  float tone = 0;               ///< wanted coverage, 0..1
-  float energy_j = 0;           ///< = power_w * pulse_s
+  Eigen::Vector3d position_O;  ///< where the beam shall land, m
+  Eigen::Vector3f normal_O;    ///< of the face there
+  float tone = 0;              ///< wanted coverage, 0..1
+  float energy_j = 0;          ///< = power_w * pulse_s
   Joints joints{};
   float power_w = 0, pulse_s = 0;
   float incidence = 0;          ///< rad, against the face normal
   std::uint32_t dot_index = 0;  ///< in dots.ply
 };
 
-/// A way-point passed (at rest, laser off) before `before_exposure`; several in order of appearance. before_exposure == exposures.size(): the way home.
+/// A way-point passed (at rest, laser off) before `before_exposure`; several in order of appearance. before_exposure ==
+/// exposures.size(): the way home.
 struct Via {
   std::uint32_t before_exposure = 0;
   Joints joints{};

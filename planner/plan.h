@@ -13,18 +13,20 @@
 #include "sampling/textured_mesh.h"
 
 /// Dots to program, the entry of planner/:
-///   reach (which beam directions hit the dot, or why none) -> pose_search (one pose a dot, holding the table) -> time_model -> dose -> program.
+///   reach (which beam directions hit the dot, or why none) -> pose_search (one pose a dot, holding the table) ->
+///   time_model -> dose -> program.
 namespace hilbrush {
 
 enum class SkipReason : std::uint8_t {
-  kOccluded,        ///< every beam within the cone is blocked by the object
-  kIncidence,       ///< no pose brings the beam within the cone
-  kJointLimit,      ///< the poses that would do exceed a joint's limits
-  kLensObject,      ///< the lens body or quill would touch the object
-  kLensTable,       ///< ... or the table plate, post
-  kEnergy           ///< the laser cannot deliver the dot's energy
+  kOccluded,    ///< every beam within the cone is blocked by the object
+  kIncidence,   ///< no pose brings the beam within the cone
+  kJointLimit,  ///< the poses that would do exceed a joint's limits
+  kLensObject,  ///< the lens body or quill would touch the object
+  kLensTable,   ///< ... or the table plate, post
+  kEnergy       ///< the laser cannot deliver the dot's energy
 };
-const char* skip_reason_name(SkipReason reason);  ///< "occluded", "incidence", "joint_limit", "lens_object", "lens_table", "energy"
+const char* skip_reason_name(
+    SkipReason reason);  ///< "occluded", "incidence", "joint_limit", "lens_object", "lens_table", "energy"
 
 struct SkippedDot {
   std::uint32_t dot_index = 0;
@@ -39,7 +41,8 @@ class Reach {
   ~Reach();
   Reach(Reach&&) noexcept;
   /// Whether some pose within the cone exposes the point; `skipped` (optional) gets the reason if none does.
-  bool is_reachable(const Eigen::Vector3d& position_O, const Eigen::Vector3d& normal_O, SkippedDot* skipped = nullptr) const;
+  bool is_reachable(const Eigen::Vector3d& position_O, const Eigen::Vector3d& normal_O,
+                    SkippedDot* skipped = nullptr) const;
 
   struct Implementation;
   const Implementation& implementation() const { return *implementation_; }
@@ -63,8 +66,10 @@ struct Plan {
 /// Cost: O(dots), memory O(dots).
 Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress& progress = {});
 
-/// The checked way from measured joints to exposure `next` of the program: way-points, possibly none (the direct move is clear).
+/// The checked way from measured joints to exposure `next` of the program: way-points, possibly none (the direct move
+/// is clear).
 /// @throws InputError if there is no clear way.
-std::vector<Joints> plan_approach(const Reach& reach, const ExposureProgram& program, std::size_t next, const Joints& from);
+std::vector<Joints> plan_approach(const Reach& reach, const ExposureProgram& program, std::size_t next,
+                                  const Joints& from);
 
 }  // namespace hilbrush

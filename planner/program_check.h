@@ -4,19 +4,20 @@
 
 #include "planner/plan.h"
 
-/// An independent pass over a finished program, with forward kinematics and rays of its own rather than planning's caches:
-/// limits, continuity, J4 and C winding, elbow flips, FK within 1e-9 m of the dot, incidence, power and pulse, clearance at dots and
-/// along moves, every dot exactly once or skipped with a reason.
+/// An independent pass over a finished program, with forward kinematics and rays of its own rather than planning's
+/// caches: limits, continuity, J4 and C winding, elbow flips, FK within 1e-9 m of the dot, incidence, power and pulse,
+/// clearance at dots and along moves, every dot exactly once or skipped with a reason.
 namespace hilbrush {
 
 struct ProgramFault {
-  std::string what;              ///< a sentence with amounts
+  std::string what;  ///< a sentence with amounts
   std::size_t exposure = 0;
 };
 
 /// At most `limit` faults, first ones first; empty: the program may be run.
-std::vector<ProgramFault> check_program(const ExposureProgram& program, const std::vector<SkippedDot>& skipped, const DotSequence& dots,
-                                        const TexturedMesh& mesh, const CellDescription& cell, const PlanOptions& options,
-                                        std::size_t limit = 20, const Progress& progress = {});
+std::vector<ProgramFault> check_program(const ExposureProgram& program, const std::vector<SkippedDot>& skipped,
+                                        const DotSequence& dots, const TexturedMesh& mesh, const CellDescription& cell,
+                                        const PlanOptions& options, std::size_t limit = 20,
+                                        const Progress& progress = {});
 
 }  // namespace hilbrush

@@ -1,8 +1,8 @@
 #pragma once
 #include "planner/cell_description.h"
 
-/// How long the cell takes: trapezoidal per axis, slowest axis, settle that grows with the move. Part of planner because plans need it,
-/// kept to std so that the daemon's ETA and the simulated devices' tests can compare against it.
+/// How long the cell takes: trapezoidal per axis, slowest axis, settle that grows with the move. Part of planner
+/// because plans need it, kept to std so that the daemon's ETA and the simulated devices' tests can compare against it.
 namespace hilbrush {
 
 /// Rest to rest over `distance` (>= 0) with a trapezoidal speed profile.
