@@ -1,0 +1,69 @@
+#include "sampling/dots_file.h"
+
+#include <array>
+#include <bit>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "sampling/check.h"
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the rows are written as they lie in memory");
+
+constexpr std::size_t kRowBytes = 3 * sizeof(double) + 5 * sizeof(float) + sizeof(std::uint32_t) + 1;
+constexpr std::size_t kRowsAtOnce = 4096;
+
+std::string header(const DotSequence& sequence, std::span<const std::string> reason_names) {
+  std::ostringstream out;
+  out.precision(12);
+  out << "ply\nformat binary_little_endian 1.0\ncomment dots of Hilbrush in painting order; metres, object frame\n"
+      << "comment pitch_m " << sequence.pitch_m << '\n';
+  for (std::size_t code = 0; code < reason_names.size(); ++code)
+    out << "comment reason " << code << ' ' << reason_names[code] << '\n';
+  out << "element vertex " << sequence.dots.size() << '\n';
+  for (const char* name : {"x", "y", "z"}) out << "property double " << name << '\n';
+  for (const char* name : {"nx", "ny", "nz", "tone", "level"}) out << "property float " << name << '\n';
+  out << "property uint component\nproperty uchar reason\nend_header\n";
+  return out.str();
+}
+
+template <class T>
+char* put(char* at, const T& value) {
+  std::memcpy(at, &value, sizeof value);
+  return at + sizeof value;
+}
+
+char* put_dot(char* at, const Dot& dot, std::uint8_t reason) {
+  for (int k = 0; k < 3; ++k) at = put(at, dot.position_O[k]);
+  for (int k = 0; k < 3; ++k) at = put(at, dot.normal_O[k]);
+  at = put(at, dot.tone);
+  at = put(at, dot.level);
+  at = put(at, dot.component);
+  return put(at, reason);
+}
+
+}  // namespace
+
+void write_dots(const DotSequence& sequence, std::span<const std::uint8_t> reasons,
+                std::span<const std::string> reason_names, const std::filesystem::path& file) {
+  CHECK_EQ(reasons.size(), sequence.dots.size());
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  if (!out) throw InputError(file.string(), "can't be opened for writing");
+  const std::string text = header(sequence, reason_names);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  std::array<char, kRowBytes * kRowsAtOnce> rows;
+  for (std::size_t i = 0; i < sequence.dots.size();) {
+    char* end = rows.data();
+    for (std::size_t k = 0; k < kRowsAtOnce && i < sequence.dots.size(); ++k, ++i)
+      end = put_dot(end, sequence.dots[i], reasons[i]);
+    out.write(rows.data(), end - rows.data());
+  }
+  out.close();
+  if (!out) throw InputError(file.string(), "can't be written: is the disk full?");
+}
+
+}  // namespace hilbrush
