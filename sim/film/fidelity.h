@@ -8,14 +8,14 @@
 namespace hilbrush {
 
 struct FidelityFigures {
-  double f1_db = 0, f2_db = 0;   ///< -10 log10 of the mean squared difference of Gaussian means, sigma = 1 and 2 pitches
-  double s2 = 0;                 ///< SSIM of six views
+  double f1_db = 0, f2_db = 0;  ///< -10 log10 of the mean squared difference of Gaussian means, sigma = 1 and 2 pitches
+  double s2 = 0;                ///< SSIM of six views
   double tone_rms = 0, tone_max = 0;  ///< error of mean tone per tenth of wanted tone, at 2 pitches, weighted by area
-  double p999 = 0;               ///< 99.9th percentile of the absolute error at 2 pitches
+  double p999 = 0;                    ///< 99.9th percentile of the absolute error at 2 pitches
 };
 
 struct Fidelity {
-  FidelityFigures reachable;     ///< over surface whose own reach test passes
+  FidelityFigures reachable;  ///< over surface whose own reach test passes
   FidelityFigures whole;
   double unreachable_share = 0;  ///< of the area
 };

@@ -8,37 +8,50 @@
 #include "sampling/progress.h"
 #include "sampling/textured_mesh.h"
 #include "sim/devices/emission_record.h"
+#include "sim/film/film_lattice.h"
 
 /// The film: what the emissions expose on the object's surface, developed afterwards from their record.
-/// Each emission is a beam from the pose its joints give (forward kinematics of this folder's own), cast onto the mesh: a Gaussian spot,
-/// elliptical when oblique, larger when out of focus; its dose gathers in per-triangle micro-grids of spacing pitch/2.
+/// Each emission is a beam from the pose its joints give (beam.h: forward kinematics of this folder's own), cast from
+/// the lens onto the mesh (surface_index.h): a Gaussian spot, elliptical when oblique, larger when out of focus. Its
+/// dose gathers on small lattices of spacing pitch/2 on the triangles (film_lattice.h), on those that face the beam and
+/// lie within two cut radii of depth of where it hit.
 namespace hilbrush {
 
 struct Hit {
   bool is_hit = false;
-  bool is_shadowed = false;             ///< something stood between lens and focus: the beam landed there instead
+  bool is_shadowed = false;  ///< something stood between lens and focus: the beam landed there instead
   SurfacePoint point;
   Eigen::Vector3d position_O = Eigen::Vector3d::Zero();
-  double incidence = 0;                 ///< rad, against the face normal
-  double defocus_m = 0;                 ///< from the focus to the hit along the beam
+  double incidence = 0;  ///< rad, against the face normal
+  double defocus_m = 0;  ///< from the focus to the hit along the beam
 };
 
 class Film {
  public:
-  /// Keeps references to mesh and cell, which must outlive it.
+  /// Keeps references to mesh and cell, which must outlive it. @throws InputError if the film would need more memory
+  /// than is sensible.
   Film(const TexturedMesh& mesh, const CellDescription& cell, double pitch_m);
   ~Film();
   Film(Film&&) noexcept;
 
   /// Adds the emissions' dose; returns where each landed (same order). Bit-identical for any number of threads.
+  /// Cost: O(emissions), some .6 M a second and core.
   std::vector<Hit> expose(std::span<const Emission> emissions, const Progress& progress = {});
-  /// Adds dose straight at given surface points at normal incidence, as a perfect cell would: for calibration.
+  /// Adds dose straight at given surface points at normal incidence, as a perfect cell would: for calibration. A level
+  /// of 1 is the full energy.
   void expose_at(std::span<const SurfacePoint> points, std::span<const float> levels);
 
   double dose_j_m2(const SurfacePoint& point) const;  ///< interpolated
   double painted(const SurfacePoint& point) const;    ///< coverage 0..1 by the paint's response
 
+  /// Replaces `points` by the film's points in the cylinder of this radius and half height about `center`, along its
+  /// face normal, on triangles that face the same way.
+  void points_near(const SurfacePoint& center, double radius_m, std::vector<FilmPoint>& points) const;
+  /// Coverage 0..1 for a dose.
+  double painted(double dose_j_m2) const;
+
   const TexturedMesh& mesh() const;
+  const CellDescription& cell() const;
   double pitch_m() const;
 
  private:
