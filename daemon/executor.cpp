@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include "drivers/driver_error.h"
 #include "planner/time_model.h"
@@ -17,6 +18,11 @@ constexpr double kPulseGraceS = 0.1;  ///< the same for a pulse
 /// Ends a run early without a fault; carries no text because it is thrown on the ordinary way out of a stop or a pause.
 struct RunEnded {
   ExecutionOutcome outcome;
+};
+
+/// The program asks for something outside the limits: no device is to blame.
+struct ProgramRefused : std::runtime_error {
+  using std::runtime_error::runtime_error;
 };
 
 std::string millimetres_or_degrees(int axis, double value) {
@@ -42,11 +48,13 @@ class Run {
       ExecutionControl& control)
       : program_(program), cell_(cell), description_(description), journal_(journal), control_(control) {}
 
+  void travel_all(const std::vector<Joints>& way);
   void expose_all(const std::vector<Joints>& approach, const ExecutionProgress& progress);
   std::size_t exposed() const { return exposed_; }
 
  private:
-  void check_ready();
+  void check_axes_ready();
+  void check_laser_ready();
   void check_pose(const Joints& target, std::size_t exposure) const;
   void check_pulse(const Exposure& exposure, std::size_t i) const;
   void prove_laser_off();
@@ -82,20 +90,24 @@ void Run::prove_laser_off() {
   if (!cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
 }
 
-void Run::check_ready() {
+void Run::check_axes_ready() {
   prove_laser_off();
   const auto robot = cell_.robot.status();
   const auto table = cell_.table.status();
-  const auto laser = cell_.laser.status();
   if (robot.state != DeviceState::kReady)
     throw DriverError(std::string("the robot is not ready but ") + device_state_name(robot.state));
   if (table.state != DeviceState::kReady)
     throw DriverError(std::string("the table is not ready but ") + device_state_name(table.state));
-  if (laser.state != DeviceState::kReady)
-    throw DriverError(std::string("the laser is not armed but ") + device_state_name(laser.state));
-  laser_limits_ = cell_.laser.limits();
   std::copy(robot.positions.begin(), robot.positions.end(), at_.begin());
   std::copy(table.positions.begin(), table.positions.end(), at_.begin() + kTilt);
+}
+
+void Run::check_laser_ready() {
+  const auto laser = cell_.laser.status();
+  if (!laser.interlock_closed) throw DriverError("the interlock is open");
+  if (laser.state != DeviceState::kReady)
+    throw DriverError(std::string("the laser is not armed but ") + device_state_name(laser.state) +
+                      (laser.fault.empty() ? "" : ": " + laser.fault));
 }
 
 /// Whatever the planner said: outside the cell's limits nothing moves. The comparisons are written so that NaN fails
@@ -105,10 +117,10 @@ void Run::check_pose(const Joints& target, std::size_t exposure) const {
     const auto& limits = description_.axes[static_cast<std::size_t>(axis)];
     const double value = target[static_cast<std::size_t>(axis)];
     if (value >= limits.min - kJointTolerance && value <= limits.max + kJointTolerance) continue;
-    throw DriverError("the program asks axis " + std::string(kAxisNames[static_cast<std::size_t>(axis)]) + " for " +
-                      millimetres_or_degrees(axis, value) + " at exposure " + std::to_string(exposure) +
-                      ", outside its limits " + millimetres_or_degrees(axis, limits.min) + " to " +
-                      millimetres_or_degrees(axis, limits.max));
+    throw ProgramRefused("the program asks axis " + std::string(kAxisNames[static_cast<std::size_t>(axis)]) + " for " +
+                         millimetres_or_degrees(axis, value) + " at exposure " + std::to_string(exposure) +
+                         ", outside its limits " + millimetres_or_degrees(axis, limits.min) + " to " +
+                         millimetres_or_degrees(axis, limits.max));
   }
 }
 
@@ -119,11 +131,11 @@ void Run::check_pulse(const Exposure& exposure, std::size_t i) const {
     return value >= low * (1 - kRelative) && value <= high * (1 + kRelative);
   };
   if (!within(power, laser_limits_.power_min_w, laser_limits_.power_max_w))
-    throw DriverError("exposure " + std::to_string(i) + " asks for " + std::to_string(power) +
-                      " W, outside the laser's limits");
+    throw ProgramRefused("exposure " + std::to_string(i) + " asks for " + std::to_string(power) +
+                         " W, outside the laser's limits");
   if (!within(pulse, laser_limits_.pulse_min_s, laser_limits_.pulse_max_s))
-    throw DriverError("exposure " + std::to_string(i) + " asks for a pulse of " + std::to_string(pulse) +
-                      " s, outside the laser's limits");
+    throw ProgramRefused("exposure " + std::to_string(i) + " asks for a pulse of " + std::to_string(pulse) +
+                         " s, outside the laser's limits");
 }
 
 /// Both chains start together. A chain that rests where it shall be isn't commanded again, but its in_position is
@@ -170,6 +182,11 @@ void Run::wait_in_position(double deadline_s) {
   }
 }
 
+void Run::travel_all(const std::vector<Joints>& way) {
+  check_axes_ready();
+  visit_approach(way);
+}
+
 void Run::visit_approach(const std::vector<Joints>& approach) {
   for (const Joints& via : approach) {
     check_pose(via, 0);
@@ -202,10 +219,7 @@ void Run::wait_pulse_end(const Exposure& exposure) {
 
 void Run::expose(std::size_t i) {
   const Exposure& exposure = program_.exposures[i];
-  const auto before = cell_.laser.status();
-  if (!before.interlock_closed) throw DriverError("the interlock is open");
-  if (before.state != DeviceState::kReady)
-    throw DriverError(std::string("the laser is not ready but ") + device_state_name(before.state));
+  check_laser_ready();
   end_if_asked();
   if (control_.pause.load()) throw RunEnded{ExecutionOutcome::kPaused};
 
@@ -231,7 +245,9 @@ void Run::expose(std::size_t i) {
 }
 
 void Run::expose_all(const std::vector<Joints>& approach, const ExecutionProgress& progress) {
-  check_ready();
+  check_axes_ready();
+  check_laser_ready();
+  laser_limits_ = cell_.laser.limits();
   const std::size_t count = program_.exposures.size();
   std::size_t first = 0;
   while (first < count && journal_.state(first) != ExposureState::kRemaining) ++first;
@@ -264,32 +280,54 @@ void make_safe(const Cell& cell) noexcept {
   cell.table.stop();
 }
 
+/// Every way out of a run: the beam is off, and unless the work ended by itself, the axes are stopped.
+template <class Work>
+ExecutionResult run_guarded(const Cell& cell, const ExecutionControl& control, Work work) {
+  ExecutionResult result;
+  const double begin_s = cell.clock.now_s();
+  try {
+    work();
+    cell.laser.off();
+  } catch (const RunEnded& ended) {
+    make_safe(cell);
+    result.outcome = ended.outcome;
+  } catch (const ProgramRefused& refusal) {
+    make_safe(cell);
+    result.outcome = ExecutionOutcome::kFailed;
+    result.reason = refusal.what();
+    result.is_program_at_fault = true;
+  } catch (const std::exception& error) {
+    make_safe(cell);
+    // A device that refuses because it was just stopped is no fault.
+    result.outcome = control.stop.load() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed;
+    result.reason = error.what();
+  }
+  if (result.outcome == ExecutionOutcome::kStopped) result.reason = "the cell was stopped";
+  result.elapsed_s = cell.clock.now_s() - begin_s;
+  return result;
+}
+
 }  // namespace
 
 ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints>& approach, const Cell& cell,
                         const CellDescription& description, Journal& journal, ExecutionControl& control,
                         const ExecutionProgress& progress) {
-  ExecutionResult result;
-  const double begin_s = cell.clock.now_s();
   Run run(program, cell, description, journal, control);
-  try {
+  ExecutionResult result = run_guarded(cell, control, [&] {
     if (journal.exposure_count() != program.exposures.size())
-      throw DriverError("the journal belongs to a program of another length");
+      throw ProgramRefused("the journal belongs to a program of another length");
     run.expose_all(approach, progress);
-  } catch (const RunEnded& ended) {
-    make_safe(cell);
-    result.outcome = ended.outcome;
-    result.reason = ended.outcome == ExecutionOutcome::kStopped ? "the cell was stopped" : "";
-  } catch (const std::exception& error) {
-    make_safe(cell);
-    // A device that refuses because it was just stopped is no fault.
-    result.outcome = control.stop.load() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed;
-    result.reason = control.stop.load() ? "the cell was stopped" : error.what();
-  }
-  cell.laser.off();
-  result.elapsed_s = cell.clock.now_s() - begin_s;
+  });
   result.exposed = run.exposed();
   return result;
+}
+
+ExecutionResult travel(const std::vector<Joints>& way, const Cell& cell, const CellDescription& description,
+                       ExecutionControl& control) {
+  const ExposureProgram no_program;
+  Journal no_journal = Journal::in_memory(0);
+  Run run(no_program, cell, description, no_journal, control);
+  return run_guarded(cell, control, [&] { run.travel_all(way); });
 }
 
 void bring_up(const Cell& cell) {

@@ -24,7 +24,9 @@ enum class ExecutionOutcome { kFinished, kPaused, kStopped, kFailed };
 
 struct ExecutionResult {
   ExecutionOutcome outcome = ExecutionOutcome::kFinished;
-  std::string reason;       ///< a sentence when stopped or failed
+  std::string reason;  ///< a sentence when stopped or failed
+  bool is_program_at_fault =
+      false;  ///< failed because the program asks for what the cell must not do; nothing is wrong with the cell
   double elapsed_s = 0;     ///< on the cell's clock
   std::size_t exposed = 0;  ///< in this run
 };
@@ -39,6 +41,11 @@ using ExecutionProgress = std::function<void(std::size_t exposures_done)>;
 ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints>& approach, const Cell& cell,
                         const CellDescription& description, Journal& journal, ExecutionControl& control,
                         const ExecutionProgress& progress = {});
+
+/// Moves through way-points in the dark, as the operator ordered (homing); the laser needs not be armed. Progress of
+/// nothing: no exposure is made. Executor's thread only. Never throws.
+ExecutionResult travel(const std::vector<Joints>& way, const Cell& cell, const CellDescription& description,
+                       ExecutionControl& control);
 
 /// Everything from disconnected to ready, the laser armed; what is there already stays as it is. For dry runs and
 /// tests: on a real cell these are separate acts of the operator. @throws DriverError
