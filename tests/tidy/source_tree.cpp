@@ -1,0 +1,92 @@
+#include "tests/tidy/source_tree.h"
+
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+
+namespace hilbrush::tidy {
+namespace fs = std::filesystem;
+
+std::vector<std::string> SourceFile::lines() const {
+  std::vector<std::string> result;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) result.push_back(line);
+  return result;
+}
+
+fs::path top_folder() {
+  return HILBRUSH_SOURCE_DIR;
+}
+
+bool is_ignored_name(const std::string& name) {
+  return name == ".git" || name.starts_with("build") || name == "compile_commands.json" || name.ends_with(".swp");
+}
+
+std::vector<std::string> all_files() {
+  std::vector<std::string> paths;
+  for (const fs::directory_entry& entry : fs::directory_iterator(top_folder())) {
+    if (is_ignored_name(entry.path().filename())) continue;
+    if (entry.is_regular_file()) paths.push_back(entry.path().filename());
+    if (!entry.is_directory()) continue;
+    for (const fs::directory_entry& below : fs::recursive_directory_iterator(entry)) {
+      const bool is_leftover =
+          below.path().extension() == ".swp" || below.path().string().find("/__pycache__/") != std::string::npos;
+      if (below.is_regular_file() && !is_leftover) paths.push_back(fs::relative(below, top_folder()).generic_string());
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+namespace {
+
+bool is_text_of_people(const std::string& path) {
+  if (path.find("/corpus") != std::string::npos || path.find("/golden/") != std::string::npos) return false;
+  if (path.starts_with("tests/data/")) return path.ends_with(".py");
+  static constexpr std::array kBinary{".png", ".jpg", ".gif", ".tga", ".bmp", ".tif", ".gz"};
+  return std::none_of(kBinary.begin(), kBinary.end(), [&](const char* ending) { return path.ends_with(ending); });
+}
+
+std::vector<SourceFile> read_source_files() {
+  std::vector<SourceFile> files;
+  for (const std::string& path : all_files()) {
+    if (!is_text_of_people(path)) continue;
+    std::ifstream stream(top_folder() / path, std::ios::binary);
+    std::ostringstream text;
+    text << stream.rdbuf();
+    files.push_back({path, text.str()});
+  }
+  return files;
+}
+
+}  // namespace
+
+const std::vector<SourceFile>& source_files() {
+  static const std::vector<SourceFile> files = read_source_files();
+  return files;
+}
+
+CommandResult run_command(const std::string& command) {
+  CommandResult result;
+  FILE* pipe = popen(("( " + command + " ) 2>&1").c_str(), "r");
+  if (!pipe) throw std::runtime_error("can't run " + command);
+  std::array<char, 4096> buffer;
+  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    result.output.append(buffer.data(), count);
+  const int status = pclose(pipe);
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return result;
+}
+
+std::string find_program(const std::string& name) {
+  const CommandResult result = run_command("command -v " + name);
+  return result.exit_code == 0 ? result.output.substr(0, result.output.find('\n')) : "";
+}
+
+}  // namespace hilbrush::tidy
