@@ -52,21 +52,22 @@ std::string join(const std::string& origin, const std::string& path) {
   return origin.empty() ? path : origin + ": " + path;
 }
 
-/// What was found, short enough for a sentence.
-std::string describe(const Json& value) {
-  if (value.is_object()) return "an object";
-  if (value.is_array()) return "a list of " + std::to_string(value.size());
-  constexpr std::size_t kShown = 60;
-  std::string text = value.dump(-1, ' ', true);
-  if (text.size() > kShown) text = text.substr(0, kShown) + "...";
-  return text;
-}
-
 std::string format_number(double value) {
   std::ostringstream out;
   out.precision(12);
   out << value;
   return out.str();
+}
+
+/// What was found, short enough for a sentence.
+std::string describe(const Json& value) {
+  if (value.is_object()) return "an object";
+  if (value.is_array()) return "a list of " + std::to_string(value.size());
+  if (value.is_number_float()) return format_number(value.get<double>());
+  constexpr std::size_t kShown = 60;
+  std::string text = value.dump(-1, ' ', true);
+  if (text.size() > kShown) text = text.substr(0, kShown) + "...";
+  return text;
 }
 
 std::string describe(JsonRange range) {

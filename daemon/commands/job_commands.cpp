@@ -1,0 +1,162 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <istream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "daemon/commands/command_context.h"
+#include "daemon/commands/exit_code.h"
+#include "daemon/commands/rpc_client.h"
+#include "daemon/commands/settings_flags.h"
+#include "daemon/commands/text_output.h"
+#include "daemon/commands/watch.h"
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// The daemon copies the model, its textures and inlines before it answers.
+constexpr auto kSubmitTimeout = std::chrono::seconds(60);
+
+struct JobFlags {
+  std::string id;
+  std::string model, key;
+  bool dry_run = false;
+  SettingsFlags settings;
+  bool part_in_place = false;
+  std::string in_doubt;
+  std::string until = "done";
+};
+
+/// The answer of every method that has one job as its result.
+int print_job(const CommandContext& context, const Json& result, bool in_full) {
+  const Json& job = member(result, "job");
+  if (context.is_json)
+    context.terminal.out << result.dump() << std::endl;
+  else
+    context.terminal.out << (in_full ? format_job(job) : format_job_line(job) + "\n") << std::flush;
+  return kExitOk;
+}
+
+int submit(const CommandContext& context, const JobFlags& flags) {
+  std::error_code error;
+  if (!fs::exists(flags.model, error)) throw InputError(flags.model, "no such model");
+  Json params{{"model", fs::absolute(flags.model).lexically_normal().string()},
+              {"settings", Json::parse(flags.settings.to_json())},
+              {"dry_run", flags.dry_run}};
+  if (!flags.key.empty()) params["key"] = flags.key;
+  RpcClient client(context.socket_path);
+  return print_job(context, client.call("job.submit", params, kSubmitTimeout), false);
+}
+
+int list(const CommandContext& context) {
+  RpcClient client(context.socket_path);
+  const Json result = client.call("job.list", Json());
+  if (context.is_json)
+    context.terminal.out << result.dump() << std::endl;
+  else
+    context.terminal.out << format_job_table(result.is_array() ? result : member(result, "jobs")) << std::flush;
+  return kExitOk;
+}
+
+/// Only a person can see whether the part is there: a flag, or a question on a terminal.
+bool is_part_in_place(const CommandContext& context, const JobFlags& flags) {
+  if (flags.part_in_place) return true;
+  if (!context.terminal.in_is_terminal) return false;
+  context.terminal.err << "Is the part of job " << printable(flags.id) << " in place? [y/N] " << std::flush;
+  std::string answer;
+  std::getline(context.terminal.in, answer);
+  return answer == "y" || answer == "Y" || answer == "yes";
+}
+
+int start(const CommandContext& context, const JobFlags& flags) {
+  if (!is_part_in_place(context, flags)) {
+    context.terminal.err << "hilbrush: not started: say --part-in-place once the part is on the table\n";
+    return kExitRefused;
+  }
+  RpcClient client(context.socket_path);
+  return print_job(context, client.call("job.start", Json{{"id", flags.id}, {"part_in_place", true}}), false);
+}
+
+int resume(const CommandContext& context, const JobFlags& flags) {
+  Json params{{"id", flags.id}};
+  if (!flags.in_doubt.empty()) params["in_doubt"] = flags.in_doubt;
+  RpcClient client(context.socket_path);
+  return print_job(context, client.call("job.resume", params), false);
+}
+
+int call_with_id(const CommandContext& context, const JobFlags& flags, const std::string& method, bool in_full) {
+  RpcClient client(context.socket_path);
+  return print_job(context, client.call(method, Json{{"id", flags.id}}), in_full);
+}
+
+using Action = std::function<int(CommandContext&, const JobFlags&)>;
+
+struct Declared {
+  CLI::App* app;
+  std::shared_ptr<JobFlags> flags;
+};
+
+Declared declare(CLI::App& app, CommandContext& context, const char* name, const char* description, Action action) {
+  auto flags = std::make_shared<JobFlags>();
+  CLI::App* command = add_daemon_command(app, context, name, description);
+  command->callback([&context, flags, action = std::move(action)] {
+    context.action = [&context, flags, action] { return action(context, *flags); };
+  });
+  return {command, flags};
+}
+
+Declared declare_with_id(CLI::App& app, CommandContext& context, const char* name, const char* description,
+                         Action action) {
+  const Declared declared = declare(app, context, name, description, std::move(action));
+  declared.app->add_option("ID", declared.flags->id, "the job's number, see `hilbrush list`")->required();
+  return declared;
+}
+
+void add_submit(CLI::App& app, CommandContext& context) {
+  const Declared command =
+      declare(app, context, "submit", "hand a model to the daemon; it is planned at once and waits for start", submit);
+  command.app->add_option("MODEL", command.flags->model, "VRML, OBJ, PLY, OFF or STL file")->required();
+  command.app->add_flag("--dry-run", command.flags->dry_run, "paint on a simulated cell of its own; needs no start");
+  command.app->add_option("--key", command.flags->key, "submitting again with the same key finds the same job");
+  command.flags->settings.add_to(*command.app);
+}
+
+void add_watch(CLI::App& app, CommandContext& context) {
+  const Declared command =
+      declare_with_id(app, context, "watch", "follow a job until it ends",
+                      [](CommandContext& c, const JobFlags& flags) { return watch_job(c, flags.id, flags.until); });
+  command.app
+      ->add_option("--until", command.flags->until,
+                   "end already when this state is reached: planning, ready, painting, paused or done")
+      ->check(CLI::IsMember({"planning", "ready", "painting", "paused", "done"}));
+}
+
+}  // namespace
+
+void add_job_commands(CLI::App& app, CommandContext& context) {
+  add_submit(app, context);
+  add_watch(app, context);
+  declare(app, context, "list", "all jobs in a table", [](CommandContext& c, const JobFlags&) { return list(c); });
+  declare_with_id(app, context, "get", "everything about one job",
+                  [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.get", true); });
+  const Declared start_command = declare_with_id(app, context, "start", "start painting a job that is ready", start);
+  start_command.app->add_flag("--part-in-place", start_command.flags->part_in_place,
+                              "the part is on the table (else you are asked)");
+  declare_with_id(app, context, "pause", "pause painting after the current dot",
+                  [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.pause", false); });
+  const Declared resume_command = declare_with_id(app, context, "resume", "go on painting", resume);
+  resume_command.app
+      ->add_option("--in-doubt", resume_command.flags->in_doubt, "dots that may have been exposed: leave or expose")
+      ->check(CLI::IsMember({"leave", "expose"}));
+  declare_with_id(app, context, "cancel", "give a job up",
+                  [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.cancel", false); });
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,159 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "config/cell_file.h"
+#include "config/job_settings.h"
+#include "config/json_reader.h"
+#include "daemon/commands/command_context.h"
+#include "daemon/commands/exit_code.h"
+#include "daemon/commands/pipeline_run.h"
+#include "daemon/commands/progress_display.h"
+#include "daemon/commands/settings_flags.h"
+#include "daemon/commands/text_output.h"
+
+namespace hilbrush {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::array kStages{"load", "disk", "curve", "dots", "plan", "check", "paint", "images"};
+constexpr std::size_t kReportBytesMax = 64u << 20;
+
+struct PipelineFlags {
+  std::string command, model, output, program, emissions;
+  SettingsFlags settings;
+};
+
+/// "plan 40 % (stage 5 of 8)".
+std::string stage_text(const std::string& stage, double fraction) {
+  std::string text = stage + " " + std::to_string(static_cast<int>(100 * fraction)) + " %";
+  if (const auto found = std::find(kStages.begin(), kStages.end(), stage); found != kStages.end())
+    text += " (stage " + std::to_string(found - kStages.begin() + 1) + " of " + std::to_string(kStages.size()) + ")";
+  return text;
+}
+
+std::string existing_file(const std::string& file, const char* what) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) throw InputError(file, std::string("no such ") + what);
+  if (fs::is_directory(status)) throw InputError(file, std::string("is a folder, not a ") + what);
+  return fs::absolute(file).lexically_normal().string();
+}
+
+/// The settings that made a program stand in the report beside it.
+std::string settings_beside(const std::string& program) {
+  const fs::path report = fs::path(program).parent_path() / "report.json";
+  std::error_code error;
+  if (!fs::exists(report, error)) return {};
+  const Json json = Json::parse(read_text_file(report.string(), kReportBytesMax), nullptr, false);
+  const Json& settings = member(json, "settings");
+  return settings.is_object() ? settings.dump() : std::string();
+}
+
+std::vector<std::string> child_arguments(const PipelineFlags& flags, const JobSettings& settings,
+                                         const fs::path& cell) {
+  std::vector<std::string> arguments{flags.command};
+  const auto add = [&](const char* name, const std::string& value) {
+    arguments.emplace_back(name);
+    arguments.push_back(value);
+  };
+  if (!flags.model.empty()) add("--model", existing_file(flags.model, "model"));
+  add("--settings-json", job_settings_to_json(settings));
+  add("--cell", fs::absolute(cell).lexically_normal().string());
+  add("--output", fs::absolute(flags.output).lexically_normal().string());
+  if (!flags.program.empty()) add("--program", existing_file(flags.program, "program"));
+  if (!flags.emissions.empty()) add("--emissions", existing_file(flags.emissions, "record of emissions"));
+  return arguments;
+}
+
+void print_files(std::ostream& out, const fs::path& output) {
+  struct Line {
+    const char *label, *file;
+  };
+  constexpr std::array kLines{Line{"report", "report.json"}, Line{"pictures", "exposure.png"},
+                              Line{"views", "views"},        Line{"program", "program.ply"},
+                              Line{"dots", "dots.ply"},      Line{"tone curve", "tone_curve.json"}};
+  std::error_code error;
+  for (const Line& line : kLines) {
+    if (!fs::exists(output / line.file, error)) continue;
+    std::string label = std::string(line.label) + ":";
+    label.resize(15, ' ');
+    out << "  " << label << printable((output / line.file).string()) << '\n';
+  }
+}
+
+int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
+  const std::string beside = flags.program.empty() ? std::string() : settings_beside(flags.program);
+  const JobSettings settings = job_settings_from_json(flags.settings.to_json(beside, "report.json"));
+  const fs::path cell = find_cell(settings.cell);
+  load_cell(cell);  // refused here, at once, and not after the model was read
+  const std::vector<std::string> arguments = child_arguments(flags, settings, cell);
+
+  std::string result;
+  {
+    ProgressDisplay display(context.terminal, context.is_json);
+    PipelineRunListener listener;
+    listener.on_progress = [&](const std::string& stage, double fraction) {
+      display.show(stage, fraction, context.terminal.out_is_terminal ? stage_text(stage, fraction) : "stage: " + stage);
+    };
+    listener.on_warning = [&](const std::string& sentence) { display.print_above("warning: " + sentence); };
+    result = run_pipeline_program(find_pipeline_program(), arguments, listener);
+  }
+
+  if (context.is_json) {
+    context.terminal.out << result << std::endl;
+    return kExitOk;
+  }
+  const Json json = Json::parse(result);
+  context.terminal.out << (flags.command == "calibrate" ? format_tone_curve(json) : format_report(json));
+  print_files(context.terminal.out, flags.output);
+  return kExitOk;
+}
+
+struct Declared {
+  CLI::App* app;
+  std::shared_ptr<PipelineFlags> flags;
+};
+
+Declared declare(CLI::App& app, CommandContext& context, const std::string& name, const std::string& description) {
+  auto flags = std::make_shared<PipelineFlags>();
+  flags->command = name;
+  CLI::App* command = add_command(app, context, name, description);
+  command->add_option("-o,--output", flags->output, "folder for the results; made if absent")->required();
+  command->callback(
+      [&context, flags] { context.action = [&context, flags] { return run_pipeline(context, *flags); }; });
+  return {command, flags};
+}
+
+void add_model(const Declared& declared) {
+  declared.app->add_option("MODEL", declared.flags->model, "VRML, OBJ, PLY, OFF or STL file")->required();
+  declared.flags->settings.add_to(*declared.app);
+}
+
+}  // namespace
+
+void add_pipeline_commands(CLI::App& app, CommandContext& context) {
+  add_model(declare(app, context, "dry-run",
+                    "plan a model, paint it on the simulated cell and show the pictures; needs no daemon"));
+  add_model(declare(app, context, "plan", "make dots and exposure program of a model, without painting"));
+
+  const Declared develop = declare(app, context, "develop", "develop the film from what a simulated cell recorded");
+  add_model(develop);
+  develop.app
+      ->add_option("--program", develop.flags->program,
+                   "the program that was run; settings default to those of the report.json beside it")
+      ->required();
+  develop.app->add_option("--emissions", develop.flags->emissions, "the record of what the laser did")->required();
+
+  const Declared calibrate =
+      declare(app, context, "calibrate", "paint a grey wedge on the simulated cell and make a tone curve of it");
+  calibrate.flags->settings.add_paint_flags_to(*calibrate.app);
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,34 @@
+#pragma once
+#include <string>
+
+#include "daemon/commands/terminal.h"
+
+/// Progress on standard output: a bar that is redrawn in place on a terminal, plain lines in a pipe.
+namespace hilbrush {
+
+class ProgressDisplay {
+ public:
+  /// `is_quiet`: shows nothing (--json).
+  ProgressDisplay(Terminal& terminal, bool is_quiet) : terminal_(terminal), is_quiet_(is_quiet) {}
+  ~ProgressDisplay() { finish(); }
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  /// In a pipe a line is printed when `phase` changes and, if `lines_every_tenth`, at every tenth of the way.
+  void show(const std::string& phase, double fraction, const std::string& text, bool lines_every_tenth = false);
+  /// A line of its own, above the bar.
+  void print_above(const std::string& line);
+  /// Takes the bar away.
+  void finish();
+
+ private:
+  void clear_bar();
+
+  Terminal& terminal_;
+  bool is_quiet_;
+  std::string drawn_;  ///< the bar on the screen
+  std::string phase_;  ///< in a pipe: of the last line
+  int tenth_ = -1;
+};
+
+}  // namespace hilbrush

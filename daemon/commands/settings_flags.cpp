@@ -1,0 +1,108 @@
+#include "daemon/commands/settings_flags.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "config/json_reader.h"
+
+namespace hilbrush {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kSettingsBytesMax = 64u << 10;
+
+/// "$.size_mm" -> "--size-mm".
+std::string flag_of_path(const std::string& path) {
+  if (!path.starts_with("$.")) return path;
+  std::string flag = "--" + path.substr(2);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+template <class T>
+void put(Json& json, const char* key, const std::optional<T>& value) {
+  if (value) json[key] = *value;
+}
+
+/// A flag and its rival of which a job has one: the flag replaces what the file says.
+template <class T, class U>
+void put_pair(Json& json, const char* key, const std::optional<T>& value, const char* rival,
+              const std::optional<U>& other) {
+  if (value && !other) json.erase(rival);
+  put(json, key, value);
+}
+
+bool is_path(const std::string& cell) {
+  return cell.find('/') != std::string::npos || cell.ends_with(".json");
+}
+
+}  // namespace
+
+void SettingsFlags::add_to(CLI::App& command) {
+  const std::string group = "Settings of the job";
+  command.add_option("--dpi", dpi, "dots per inch of full tone, 10 to 1200 (default 100)")->group(group);
+  command.add_option("--dots", dots, "or: exactly so many dots")->group(group);
+  command.add_option("--size-mm", size_mm, "scale the model's longest side to this")->group(group);
+  command.add_option("--units-mm", units_mm, "or: millimetres of one unit of the file")->group(group);
+  command.add_option("--up", up, "the model's upward axis, y or z (default: the format's habit)")->group(group);
+  command.add_option("--untextured", untextured, "parts without texture or colours: auto, blank or material")
+      ->group(group);
+  command.add_option("--curve", curve, "hilbert")->group(group);
+  command.add_option("--max-incidence-deg", max_incidence_deg, "never more oblique than this, 1 to 45 (default 45)")
+      ->group(group);
+  command
+      .add_option("--preferred-incidence-deg", preferred_incidence_deg, "nearer the normal where it pays (default 20)")
+      ->group(group);
+  add_paint_flags_to(command);
+}
+
+void SettingsFlags::add_paint_flags_to(CLI::App& command) {
+  const std::string group = "Settings of the job";
+  command.add_option("--sampler", sampler, "centroid, jittered, even or random (default centroid)")->group(group);
+  command.add_option("--seed", seed, "of what is random (default 1)")->group(group);
+  command.add_option("--cell", cell, "name of a cell, or its file (default: default)")->group(group);
+  command.add_option("--settings", file, "JSON file with any of these settings; flags override it")->group(group);
+  if (command.get_option_no_throw("--dpi") == nullptr)
+    command.add_option("--dpi", dpi, "dots per inch of full tone, 10 to 1200 (default 100)")->group(group);
+}
+
+bool SettingsFlags::any() const {
+  return !file.empty() || dpi || size_mm || units_mm || max_incidence_deg || preferred_incidence_deg || dots || seed ||
+         up || untextured || sampler || curve || cell;
+}
+
+std::string SettingsFlags::to_json(const std::string& base, const std::string& base_origin) const {
+  Json json = Json::object();
+  const std::string text = file.empty() ? base : read_text_file(file, kSettingsBytesMax);
+  if (!text.empty()) {
+    job_settings_from_json(text, file.empty() ? base_origin : file);
+    json = Json::parse(text);
+  }
+  put_pair(json, "dpi", dpi, "dots", dots);
+  put_pair(json, "dots", dots, "dpi", dpi);
+  put_pair(json, "size_mm", size_mm, "units_mm", units_mm);
+  put_pair(json, "units_mm", units_mm, "size_mm", size_mm);
+  put(json, "up", up);
+  put(json, "untextured", untextured);
+  put(json, "sampler", sampler);
+  put(json, "curve", curve);
+  put(json, "seed", seed);
+  put(json, "max_incidence_deg", max_incidence_deg);
+  put(json, "preferred_incidence_deg", preferred_incidence_deg);
+  put(json, "cell", cell);
+  try {
+    const JobSettings settings = job_settings_from_json(json.dump());
+    if (json.contains("cell") && is_path(settings.cell))
+      json["cell"] = std::filesystem::absolute(settings.cell).lexically_normal();
+  } catch (const InputError& error) {
+    throw InputError(flag_of_path(error.at()), error.sentence());
+  } catch (const Json::type_error&) {
+    throw InputError("flags", "a value is not UTF-8 text");
+  }
+  return json.dump();
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,34 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "config/job_settings.h"
+
+namespace CLI {
+class App;
+}
+
+/// The settings of a job as flags: --size-mm is the key size_mm. Flags override the file given with --settings.
+namespace hilbrush {
+
+struct SettingsFlags {
+  std::string file;  ///< JSON; empty: none
+  std::optional<double> dpi, size_mm, units_mm, max_incidence_deg, preferred_incidence_deg;
+  std::optional<std::uint64_t> dots, seed;
+  std::optional<std::string> up, untextured, sampler, curve, cell;
+
+  /// Declares all flags on `command`; this object must outlive its parsing.
+  void add_to(CLI::App& command);
+  /// Without the flags that say how many dots of what size (calibrate paints wedges, not models).
+  void add_paint_flags_to(CLI::App& command);
+
+  bool any() const;  ///< anything given at all
+
+  /// What was given, flags over file, as one JSON object; a cell's file as an absolute path. `base` (optional) is JSON
+  /// that stands in for the file.
+  /// @throws InputError naming the file, or the flag as "--size-mm".
+  std::string to_json(const std::string& base = {}, const std::string& base_origin = {}) const;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,286 @@
+#include "daemon/commands/text_output.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+#include <vector>
+
+#include "daemon/commands/terminal.h"
+
+namespace hilbrush {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kLabelWidth = 15;
+
+/// "  label:      value\n".
+std::string line(const std::string& label, const std::string& value) {
+  std::ostringstream out;
+  out << "  " << std::left << std::setw(kLabelWidth) << label + ":" << printable(value) << '\n';
+  return out.str();
+}
+
+std::string fixed(double value, int digits) {
+  if (!std::isfinite(value)) return "-";
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(digits) << value;
+  return out.str();
+}
+
+bool has_number(const Json& object, const char* key) {
+  return member(object, key).is_number();
+}
+
+/// A value of any type in one line.
+std::string value_text(const Json& value) {
+  if (value.is_string()) return printable(value.get<std::string>());
+  return printable(value.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+std::string reason_text(const std::string& reason) {
+  std::string text = reason;
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
+}
+
+/// "12 occluded, 3 joint limit", from an object of counts or a bare count.
+std::string skipped_text(const Json& skipped) {
+  if (skipped.is_number()) return format_count(skipped.get<double>()) + " skipped";
+  double sum = 0;
+  std::string reasons;
+  if (skipped.is_object()) {
+    for (const auto& [reason, count] : skipped.items()) {
+      if (!count.is_number() || count.get<double>() == 0) continue;
+      sum += count.get<double>();
+      reasons += (reasons.empty() ? "" : ", ") + format_count(count.get<double>()) + " " + reason_text(reason);
+    }
+  }
+  return format_count(sum) + " skipped" + (reasons.empty() ? "" : " (" + reasons + ")");
+}
+
+std::string dots_text(const Json& dots) {
+  const double placed = number_field(dots, "placed"), exposed = number_field(dots, "exposed");
+  std::string text = format_count(placed) + " placed, " + format_count(exposed) + " exposed";
+  if (placed > 0) text += " (" + fixed(std::floor(1e4 * exposed / placed) / 100, 2) + " %)";
+  text += ", " + skipped_text(member(dots, "skipped"));
+  if (number_field(dots, "remaining") > 0) text += ", " + format_count(number_field(dots, "remaining")) + " remaining";
+  if (number_field(dots, "in_doubt") > 0) text += ", " + format_count(number_field(dots, "in_doubt")) + " in doubt";
+  return text;
+}
+
+std::string mesh_text(const Json& mesh) {
+  std::string text = format_count(number_field(mesh, "faces")) + " faces in " +
+                     format_count(number_field(mesh, "components")) +
+                     (number_field(mesh, "components") == 1 ? " component" : " components");
+  if (has_number(mesh, "area_mm2")) text += ", " + format_count(number_field(mesh, "area_mm2")) + " mm2";
+  return text;
+}
+
+std::string repairs_text(const Json& repairs) {
+  std::string text;
+  if (!repairs.is_array()) return text;
+  for (const Json& repair : repairs) {
+    const std::string one = repair.is_object()
+                                ? format_count(number_field(repair, "count")) + " " + text_field(repair, "what")
+                                : value_text(repair);
+    text += (text.empty() ? "" : ", ") + one;
+  }
+  return text;
+}
+
+std::string time_text(const Json& time) {
+  std::string text = format_duration(number_field(time, "total")), parts;
+  for (const char* part : {"move", "settle", "expose", "retract"})
+    if (has_number(time, part))
+      parts += (parts.empty() ? "" : ", ") + std::string(part) + " " + format_duration(number_field(time, part));
+  return text + (parts.empty() ? "" : " (" + parts + ")");
+}
+
+std::string fidelity_text(const Json& fidelity) {
+  std::string text = "F1 " + fixed(number_field(fidelity, "f1_db", NAN), 1) + " dB, F2 " +
+                     fixed(number_field(fidelity, "f2_db", NAN), 1) + " dB, S2 " +
+                     fixed(number_field(fidelity, "s2", NAN), 3) + ", tone rms " +
+                     fixed(number_field(fidelity, "tone_rms", NAN), 4);
+  if (has_number(fidelity, "unreachable_share"))
+    text += "; " + fixed(100 * number_field(fidelity, "unreachable_share"), 2) + " % of the surface is out of reach";
+  return text;
+}
+
+std::string id_text(const Json& job) {
+  const Json& id = member(job, "id");
+  return id.is_null() ? "?" : value_text(id);
+}
+
+std::string percent_text(const Json& job) {
+  return std::to_string(static_cast<int>(std::floor(100 * std::clamp(number_field(job, "progress"), 0., 1.)))) + " %";
+}
+
+std::string joints_text(const Json& joints) {
+  std::string text;
+  if (!joints.is_object()) return value_text(joints);
+  for (const auto& [axis, value] : joints.items())
+    text += (text.empty() ? "" : "  ") + axis + " " +
+            (value.is_number() ? fixed(value.get<double>(), 2) : value_text(value));
+  return text;
+}
+
+void add_fields(const Json& object, const std::string& prefix, std::string& text) {
+  for (const auto& [key, value] : object.items()) {
+    if (value.is_object() && !value.empty())
+      add_fields(value, prefix + key + ".", text);
+    else
+      text += printable(prefix + key) + ": " + value_text(value) + "\n";
+  }
+}
+
+}  // namespace
+
+const Json& member(const Json& object, const char* key) {
+  static const Json kNull;
+  if (!object.is_object()) return kNull;
+  const auto found = object.find(key);
+  return found == object.end() ? kNull : *found;
+}
+
+std::string text_field(const Json& object, const char* key, const std::string& otherwise) {
+  const Json& value = member(object, key);
+  return value.is_string() ? printable(value.get<std::string>()) : otherwise;
+}
+
+double number_field(const Json& object, const char* key, double otherwise) {
+  const Json& value = member(object, key);
+  return value.is_number() ? value.get<double>() : otherwise;
+}
+
+std::string format_duration(double seconds) {
+  if (!std::isfinite(seconds) || seconds < 0 || seconds > 1e10) return "-";
+  const auto whole = static_cast<long long>(std::floor(seconds + .5));
+  std::ostringstream out;
+  out << whole / 3600 << ':' << std::setfill('0') << std::setw(2) << whole / 60 % 60 << ':' << std::setw(2)
+      << whole % 60;
+  return out.str();
+}
+
+std::string format_count(double count) {
+  if (!std::isfinite(count) || std::abs(count) > 1e15) return "-";
+  std::string digits = std::to_string(static_cast<long long>(std::llround(std::abs(count))));
+  for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, ",");
+  return (count <= -.5 ? "-" : "") + digits;
+}
+
+std::string format_report(const Json& report) {
+  std::string text;
+  const Json& mesh = member(report, "mesh");
+  if (mesh.is_object()) {
+    text += line("model", text_field(mesh, "file"));
+    text += line("mesh", mesh_text(mesh));
+    if (const std::string repairs = repairs_text(member(mesh, "repairs")); !repairs.empty())
+      text += line("repaired", repairs);
+  }
+  if (const Json& dots = member(report, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
+  if (has_number(report, "pitch_mm")) text += line("pitch", fixed(number_field(report, "pitch_mm"), 3) + " mm");
+  if (const Json& incidence = member(report, "incidence_deg"); incidence.is_object())
+    text += line("incidence", "mean " + fixed(number_field(incidence, "mean"), 1) + ", 95 % below " +
+                                  fixed(number_field(incidence, "p95"), 1) + ", at most " +
+                                  fixed(number_field(incidence, "max"), 1) + " degrees");
+  if (const Json& time = member(report, "time_s"); time.is_object()) text += line("painting time", time_text(time));
+  if (const Json& fidelity = member(report, "fidelity"); fidelity.is_object())
+    text += line("fidelity", fidelity_text(fidelity));
+  if (const Json& stages = member(report, "stages_s"); stages.is_object() && has_number(stages, "total"))
+    text += line("computed in", fixed(number_field(stages, "total"), 1) + " s, " +
+                                    format_count(number_field(report, "peak_rss_mb")) + " MB");
+  if (const Json& warnings = member(mesh, "warnings"); warnings.is_array())
+    for (const Json& warning : warnings) text += line("warning", value_text(warning));
+  return text;
+}
+
+std::string format_tone_curve(const Json& curve) {
+  const Json &wanted = member(curve, "wanted"), &asked = member(curve, "asked");
+  std::string text;
+  if (!wanted.is_array() || !asked.is_array()) return format_fields(curve);
+  if (const std::string sampler = text_field(curve, "sampler"); !sampler.empty()) text += line("sampler", sampler);
+  text += "  wanted  asked\n";
+  for (std::size_t i = 0; i < std::min(wanted.size(), asked.size()); ++i)
+    if (wanted[i].is_number() && asked[i].is_number())
+      text += "  " + fixed(wanted[i].get<double>(), 2) + "    " + fixed(asked[i].get<double>(), 4) + "\n";
+  return text;
+}
+
+std::string format_job_line(const Json& job) {
+  const Json& dots = member(job, "dots");
+  std::string text = "job " + id_text(job) + ": " + text_field(job, "state", "?");
+  if (const double placed = number_field(dots, "placed"); placed > 0)
+    text += ", " + format_count(number_field(dots, "exposed")) + " of " + format_count(placed) + " dots exposed";
+  text += ", " + percent_text(job);
+  if (has_number(job, "eta_s")) text += ", about " + format_duration(number_field(job, "eta_s")) + " left";
+  return text;
+}
+
+std::string format_job(const Json& job) {
+  std::string text = line("job", id_text(job)) + line("state", text_field(job, "state", "?"));
+  text += line("model", text_field(job, "model"));
+  text += line("kind", member(job, "dry_run") == true ? "dry run" : "real");
+  text += line("progress", percent_text(job) + (has_number(job, "eta_s")
+                                                    ? ", about " + format_duration(number_field(job, "eta_s")) + " left"
+                                                    : ""));
+  if (const Json& dots = member(job, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
+  static constexpr std::array kShown{"id", "state", "model", "dry_run", "progress", "eta_s", "dots"};
+  for (const auto& [key, value] : job.items()) {
+    const bool is_shown =
+        std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
+    if (!is_shown && !value.is_null()) text += line(reason_text(key), value_text(value));
+  }
+  return text;
+}
+
+std::string format_job_table(const Json& jobs) {
+  if (!jobs.is_array() || jobs.empty()) return "no jobs\n";
+  std::vector<std::array<std::string, 6>> rows{{"ID", "STATE", "KIND", "DOTS", "DONE", "MODEL"}};
+  for (const Json& job : jobs)
+    rows.push_back({id_text(job), text_field(job, "state", "?"), member(job, "dry_run") == true ? "dry" : "real",
+                    format_count(number_field(member(job, "dots"), "placed")), percent_text(job),
+                    text_field(job, "model")});
+  std::array<std::size_t, 6> widths{};
+  for (const auto& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  std::string text;
+  for (const auto& row : rows) {
+    for (std::size_t i = 0; i + 1 < row.size(); ++i) {
+      const std::string padding(widths[i] - row[i].size(), ' ');
+      const bool is_number = i == 3 || i == 4;
+      text += (is_number ? padding + row[i] : row[i] + padding) + "  ";
+    }
+    text += row.back() + "\n";
+  }
+  return text;
+}
+
+std::string format_cell(const Json& cell) {
+  std::string text = line("cell", text_field(cell, "state", "?")) + line("laser", text_field(cell, "laser", "?"));
+  if (const Json& fault = member(cell, "fault"); !fault.is_null()) text += line("fault", value_text(fault));
+  if (const Json& job = member(cell, "job"); !job.is_null()) text += line("job", value_text(job));
+  if (const Json& devices = member(cell, "devices"); devices.is_object())
+    for (const auto& [device, state] : devices.items()) text += line(device, value_text(state));
+  if (const Json& joints = member(cell, "joints"); !joints.is_null()) text += line("joints", joints_text(joints));
+  static constexpr std::array kShown{"state", "laser", "fault", "job", "devices", "joints"};
+  for (const auto& [key, value] : cell.items()) {
+    const bool is_shown =
+        std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
+    if (!is_shown && !value.is_null()) text += line(reason_text(key), value_text(value));
+  }
+  return text;
+}
+
+std::string format_fields(const Json& object) {
+  if (!object.is_object()) return value_text(object) + "\n";
+  std::string text;
+  add_fields(object, "", text);
+  return text;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,39 @@
+#pragma once
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+/// Answers of the daemon and reports of the pipeline as text for people. Fields may be missing or of another type (a
+/// newer or older program answers): what is not understood is left out, never a failure. No text contains control
+/// characters but line ends.
+namespace hilbrush {
+
+/// 3725.4 -> "1:02:05".
+std::string format_duration(double seconds);
+/// 1234567 -> "1,234,567".
+std::string format_count(double count);
+
+/// What a dry run, plan or develop found: dots, incidence, time, fidelity, repairs, warnings. Several lines.
+std::string format_report(const nlohmann::ordered_json& report);
+/// A tone curve as a table of wanted and asked coverage.
+std::string format_tone_curve(const nlohmann::ordered_json& curve);
+
+/// One line: state, counts, ETA.
+std::string format_job_line(const nlohmann::ordered_json& job);
+/// Everything about one job.
+std::string format_job(const nlohmann::ordered_json& job);
+/// A table, one job a line, under a heading.
+std::string format_job_table(const nlohmann::ordered_json& jobs);
+
+/// State of the cell, its laser, devices, joints and fault.
+std::string format_cell(const nlohmann::ordered_json& cell);
+
+/// "key: value" lines of any object; nested keys with dots.
+std::string format_fields(const nlohmann::ordered_json& object);
+
+/// Fields, or the defaults if absent or of another type.
+std::string text_field(const nlohmann::ordered_json& object, const char* key, const std::string& otherwise = {});
+double number_field(const nlohmann::ordered_json& object, const char* key, double otherwise = 0);
+/// The member, or null.
+const nlohmann::ordered_json& member(const nlohmann::ordered_json& object, const char* key);
+
+}  // namespace hilbrush

@@ -1,0 +1,80 @@
+#include "daemon/commands/watch.h"
+
+#include <poll.h>
+
+#include <array>
+#include <cerrno>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "daemon/commands/exit_code.h"
+#include "daemon/commands/interrupt.h"
+#include "daemon/commands/progress_display.h"
+#include "daemon/commands/rpc_client.h"
+#include "daemon/commands/text_output.h"
+
+namespace hilbrush {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Whether a job in `state` is at `until` or past it. A job may be paused any number of times: that is never "past" for
+/// painting.
+bool is_reached(const std::string& state, const std::string& until) {
+  const auto rank = [](const std::string& s) {
+    if (s == "queued") return 0;
+    if (s == "planning") return 1;
+    if (s == "ready") return 2;
+    if (s == "painting" || s == "paused") return 3;
+    return s == "done" || s == "failed" || s == "cancelled" ? 4 : -1;
+  };
+  return state == until || rank(state) > rank(until);
+}
+
+bool is_failed(const std::string& state) {
+  return state == "failed" || state == "cancelled";
+}
+
+/// Blocks until the daemon says something or the operator interrupts.
+Json next_update(RpcClient& client, InterruptWatch& interrupts) {
+  while (true) {
+    while (const auto notification = client.next_notification(RpcClient::Milliseconds(0)))
+      if (notification->method == "job.update") return notification->params;
+    std::array<pollfd, 2> entries{{{client.descriptor(), POLLIN, 0}, {interrupts.descriptor(), POLLIN, 0}}};
+    if (poll(entries.data(), entries.size(), -1) < 0 && errno != EINTR)
+      throw ConnectionError("the connection cannot be waited for");
+    if (interrupts.take()) throw Interrupted{"no longer watching; the job goes on"};
+  }
+}
+
+}  // namespace
+
+int watch_job(CommandContext& context, const std::string& id, const std::string& until) {
+  InterruptWatch interrupts;
+  RpcClient client(context.socket_path);
+  ProgressDisplay display(context.terminal, context.is_json);
+  Json update = client.call("job.watch", Json{{"id", id}});
+  Json job;
+  while (true) {
+    const Json& named = member(member(update, "job"), "id");
+    if ((named.is_string() ? named.get<std::string>() : named.dump()) == id) {
+      job = member(update, "job");
+      const std::string state = text_field(job, "state");
+      if (context.is_json) context.terminal.out << update.dump() << std::endl;
+      display.show(state, number_field(job, "progress"), format_job_line(job), true);
+      if (is_reached(state, until)) break;
+    }
+    update = next_update(client, interrupts);
+  }
+  display.finish();
+  if (!context.is_json) {
+    if (context.terminal.out_is_terminal) context.terminal.out << format_job_line(job) << '\n';
+    if (const std::string error = text_field(job, "error"); !error.empty())
+      context.terminal.err << "hilbrush: job " << printable(id) << ": " << error << '\n';
+    if (const std::string output = text_field(job, "output"); text_field(job, "state") == "done" && !output.empty())
+      context.terminal.out << "results are in " << output << '\n';
+  }
+  return is_failed(text_field(job, "state")) ? kExitJobFailed : kExitOk;
+}
+
+}  // namespace hilbrush
