@@ -130,11 +130,19 @@ void Film::expose_at(std::span<const SurfacePoint> points, std::span<const float
 }
 
 double Film::dose_j_m2(const SurfacePoint& point) const {
-  return implementation_->lattice.dose_j_m2(point);
+  const FilmLattice::Neighbors around = implementation_->lattice.neighbors(point);
+  double dose = 0;
+  for (std::size_t k = 0; k < around.weights.size(); ++k) dose += around.weights[k] * around.doses_j_m2[k];
+  return dose;
 }
+
 double Film::painted(const SurfacePoint& point) const {
-  return painted(dose_j_m2(point));
+  const FilmLattice::Neighbors around = implementation_->lattice.neighbors(point);
+  double coverage = 0;
+  for (std::size_t k = 0; k < around.weights.size(); ++k) coverage += around.weights[k] * painted(around.doses_j_m2[k]);
+  return coverage;
 }
+
 double Film::painted(double dose_j_m2) const {
   const CellDescription::Paint& paint = implementation_->cell.paint;
   return painted_coverage(paint.response, dose_j_m2 / paint.dose_full_j_m2);

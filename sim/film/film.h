@@ -42,9 +42,11 @@ class Film {
   void expose_at(std::span<const SurfacePoint> points, std::span<const float> levels);
 
   double dose_j_m2(const SurfacePoint& point) const;  ///< interpolated
-  double painted(const SurfacePoint& point) const;    ///< coverage 0..1 by the paint's response
+  /// Coverage 0..1 by the paint's response, which is applied at the film's nodes and then interpolated: interpolating
+  /// the dose first would smooth it, and a curved response would then make every tone too dark or too light.
+  double painted(const SurfacePoint& point) const;
 
-  /// Replaces `points` by the film's points in the cylinder of this radius and half height about `center`, along its
+  /// Replaces `points` by the film's nodes in the cylinder of this radius and half height about `center`, along its
   /// face normal, on triangles that face the same way.
   void points_near(const SurfacePoint& center, double radius_m, std::vector<FilmPoint>& points) const;
   /// Coverage 0..1 for a dose.

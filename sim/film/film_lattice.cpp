@@ -44,122 +44,122 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 }  // namespace
 
-/// A grid in the coordinates of an axis: two across it, from the axis, and the depth along it. A point at v of the way
-/// from base edge to apex and at t of its row is base + v lift + t (1 - v) along.
+/// A grid in the coordinates of an axis: two across it, from the axis, and the depth along it. The place at s metres
+/// along the longest edge and y metres above it is start + s along + y up.
 struct FilmLattice::Frame {
-  Eigen::Vector2d base, lift, along;
-  double base_depth, lift_depth, along_depth;
+  Eigen::Vector2d start, along, up;
+  double start_depth, along_depth, up_depth;
   double radius;
+  const Grid& grid;
 
-  Frame(const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& apex,
-        const Eigen::Vector3d& center_O, const Eigen::Vector3d& axis_O, double radius_m)
-      : radius(radius_m) {
-    Eigen::Vector3d x, y;
-    complete_basis(axis_O, x, y);
-    const auto across = [&](const Eigen::Vector3d& v) { return Eigen::Vector2d(x.dot(v), y.dot(v)); };
-    base = across(b - center_O), lift = across(apex - b), along = across(c - b);
-    base_depth = axis_O.dot(b - center_O), lift_depth = axis_O.dot(apex - b), along_depth = axis_O.dot(c - b);
+  double row_step() const { return static_cast<double>(grid.height_m) / grid.rows; }
+  double column_step() const { return static_cast<double>(grid.length_m) / grid.columns; }
+
+  /// Of `count` lines parallel to the rows, the first y0 above the longest edge and the others one row step apart,
+  /// those that pass the axis within the radius and between the ends of the longest edge.
+  RowRange lines_near(double y0, std::uint32_t count) const {
+    const double stretch = along.norm();  // > 0 unless the axis runs along the rows: then nothing faces it
+    if (!(stretch > 0)) return {0, 0};
+    const double step = row_step(), first = cross(along, start + y0 * up) / stretch,
+                 rise = cross(along, up) / stretch * step;
+    double low = 0, high = count - 1.;
+    if (rise != 0) {
+      const double j1 = (-radius - first) / rise, j2 = (radius - first) / rise;
+      low = std::max(low, std::ceil(std::min(j1, j2))), high = std::min(high, std::floor(std::max(j1, j2)));
+    } else if (std::abs(first) > radius) {
+      return {0, 0};
+    }
+    if (low > high) return {0, 0};
+    const double reach = radius / stretch, slack = column_step();
+    const auto nearest = [&](double line) { return -along.dot(start + (y0 + line * step) * up) / (stretch * stretch); };
+    const double s1 = nearest(low), s2 = nearest(high);
+    if (std::max(s1, s2) + reach < -slack || std::min(s1, s2) - reach > grid.length_m + slack) return {0, 0};
+    return {static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high) + 1};
   }
 
-  /// Rows whose line comes within the radius of the axis; none if the triangle as a whole stays off along the rows.
-  RowRange rows(std::uint32_t row_steps) const {
-    const double length = along.norm();
-    if (length <= 0) return {0, row_steps + 1};
-    const double start = base.dot(along) / length, apex = start + lift.dot(along) / length;
-    if (std::min(start, apex) > radius || std::max(start + length, apex) < -radius) return {0, 0};
-    const double at_base = cross(base, along) / length, rise = cross(lift, along) / length;
-    double low = 0, high = 1;
-    if (rise == 0) {
-      if (std::abs(at_base) > radius) return {0, 0};
-    } else {
-      const double v1 = (-radius - at_base) / rise, v2 = (radius - at_base) / rise;
-      low = std::max(low, std::min(v1, v2)), high = std::min(high, std::max(v1, v2));
-      if (low > high) return {0, 0};
-    }
-    constexpr double kRounding = 1e-9;
-    return {static_cast<std::uint32_t>(std::ceil(low * row_steps - kRounding)),
-            static_cast<std::uint32_t>(std::floor(high * row_steps + kRounding)) + 1};
+  /// Visits (i, squared distance from the axis, depth) for those of `count` places, from s0 on and `step` apart at
+  /// height y, that lie within the radius.
+  template <class Visit>
+  void visit_line(double y, double s0, double step, std::uint32_t count, Visit visit) const {
+    const Eigen::Vector2d place = start + y * up + s0 * along, delta = step * along;
+    const double a = delta.squaredNorm(), b = place.dot(delta), c = place.squaredNorm();
+    const double discriminant = b * b - a * (c - radius * radius);
+    if (discriminant < 0 || !(a > 0)) return;
+    const double root = std::sqrt(discriminant);
+    const double low = std::max(std::ceil((-b - root) / a), 0.),
+                 high = std::min(std::floor((-b + root) / a), count - 1.);
+    const double depth = start_depth + y * up_depth + s0 * along_depth, depth_step = step * along_depth;
+    for (double i = low; i <= high; ++i)
+      visit(static_cast<std::uint32_t>(i), c + i * (2 * b + i * a), depth + i * depth_step);
   }
 };
 
+FilmLattice::Frame FilmLattice::frame_of(std::uint32_t triangle, const Eigen::Vector3d& center_O,
+                                         const Eigen::Vector3d& axis_O, double radius_m) const {
+  const Grid& grid = grids_[triangle];
+  const Eigen::Vector3d& origin = mesh_.corner(triangle, (grid.apex + 1) % 3);
+  const Eigen::Vector3d along = (mesh_.corner(triangle, (grid.apex + 2) % 3) - origin).normalized();
+  const Eigen::Vector3d up = mesh_.area_vector(triangle).cross(along).normalized();
+  Eigen::Vector3d x, y;
+  complete_basis(axis_O, x, y);
+  const auto across = [&](const Eigen::Vector3d& v) { return Eigen::Vector2d(x.dot(v), y.dot(v)); };
+  const Eigen::Vector3d from_axis = origin - center_O;
+  return {across(from_axis), across(along),  across(up), axis_O.dot(from_axis),
+          axis_O.dot(along), axis_O.dot(up), radius_m,   grid};
+}
+
 FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mesh), grids_(mesh.triangle_count()) {
-  constexpr std::uint32_t kTilePoints = 4096, kTileRowsMin = 16, kTileRowsMax = 4096;
+  constexpr std::uint32_t kTileNodes = 4096, kTileRowsMin = 16, kTileRowsMax = 4096;
   CHECK(spacing_m > 0);
-  std::size_t row_count = 0;
-  double point_estimate = 0;
+  double node_estimate = 0;
   for (std::size_t t = 0; t < grids_.size(); ++t) {
     Grid& grid = grids_[t];
     grid.apex = static_cast<std::uint8_t>(corner_opposite_longest_edge(mesh, t));
-    const auto index = static_cast<std::uint32_t>(t);
-    const double base_m = (corner(index, grid, 1) - corner(index, grid, 2)).norm();
-    const double height_m = base_m > 0 ? 2 * mesh.area_vector(t).norm() / base_m : 0;
-    grid.base_steps = steps_over(base_m, spacing_m);
-    grid.row_steps = steps_over(height_m, spacing_m);
-    point_estimate += (.5 * grid.base_steps + 1) * (grid.row_steps + 1.);
-    if (point_estimate > kPointLimit)
+    const Eigen::Vector3d& origin = mesh.corner(t, (grid.apex + 1) % 3);
+    const Eigen::Vector3d base = mesh.corner(t, (grid.apex + 2) % 3) - origin;
+    const double length_m = base.norm();
+    grid.length_m = static_cast<float>(length_m);
+    grid.height_m = length_m > 0 ? static_cast<float>(2 * mesh.area_vector(t).norm() / length_m) : 0;
+    grid.foot_m = length_m > 0 ? static_cast<float>(base.dot(mesh.corner(t, grid.apex) - origin) / length_m) : 0;
+    grid.columns = steps_over(length_m, spacing_m);
+    grid.rows = steps_over(grid.height_m, spacing_m);
+    node_estimate += (.5 * grid.columns + 2) * (grid.rows + 1.);
+    if (node_estimate > kNodeLimit)
       throw InputError("", "the film of this object would need more than " +
-                               std::to_string(static_cast<long>(kPointLimit / 1e6)) +
-                               " million points: choose a smaller size or a lower dpi");
+                               std::to_string(static_cast<long>(kNodeLimit / 1e6)) +
+                               " million nodes: choose a smaller size or a lower dpi");
     grid.rows_per_tile =
-        static_cast<std::uint16_t>(std::clamp(kTilePoints / (grid.base_steps + 1), kTileRowsMin, kTileRowsMax));
-    grid.first_row = static_cast<std::uint32_t>(row_count);
-    grid.first_tile = tile_count_;
-    row_count += grid.row_steps + 1;
-    tile_count_ += grid.row_steps / grid.rows_per_tile + 1;
+        static_cast<std::uint16_t>(std::clamp(kTileNodes / (grid.columns + 1), kTileRowsMin, kTileRowsMax));
+    grid.first_tile = tile_count();
+    tile_triangle_.insert(tile_triangle_.end(), grid.rows / grid.rows_per_tile + 1, static_cast<std::uint32_t>(t));
   }
 
-  first_point_.reserve(row_count + 1);
-  tile_triangle_.reserve(tile_count_);
-  std::uint32_t point_count = 0;
-  for (std::uint32_t t = 0; t < grids_.size(); ++t) {
-    const Grid& grid = grids_[t];
-    for (std::uint32_t row = 0; row <= grid.row_steps; ++row) {
-      first_point_.push_back(point_count);
-      point_count += steps_of_row(grid, row) + 1;
+  std::uint32_t node_count = 0;
+  for (Grid& grid : grids_) {
+    grid.first_row = static_cast<std::uint32_t>(rows_.size());
+    for (std::uint32_t row = 0; row <= grid.rows; ++row) {
+      // The triangle narrows upwards, so what it is widest in, of the strips below and above the row, is the lower line
+      // of the one below.
+      const double share = row > 0 ? (row - 1.) / grid.rows : 0,
+                   foot = grid.length_m > 0 ? grid.foot_m / grid.length_m : 0;
+      const auto first =
+          static_cast<std::uint32_t>(std::clamp(std::floor(share * foot * grid.columns), 0., grid.columns - 1.));
+      const double end = std::ceil((1 - share * (1 - foot)) * grid.columns);
+      const auto last = static_cast<std::uint32_t>(std::clamp(end, first + 1., static_cast<double>(grid.columns)));
+      rows_.push_back({node_count, first});
+      node_count += last - first + 1;
     }
-    tile_triangle_.insert(tile_triangle_.end(), grid.row_steps / grid.rows_per_tile + 1, t);
   }
-  first_point_.push_back(point_count);
-  doses_.assign(point_count, 0);
-}
-
-/// Visits (row, place in the row, steps of the row, squared distance from the axis, depth) of every point within the
-/// frame's radius.
-template <class Visit>
-void FilmLattice::visit_points(std::uint32_t triangle, const Frame& frame, RowRange rows, Visit visit) const {
-  const Grid& grid = grids_[triangle];
-  const double radius2 = frame.radius * frame.radius;
-  for (std::uint32_t row = rows.first; row < rows.end; ++row) {
-    const double v = static_cast<double>(row) / grid.row_steps;
-    const std::uint32_t steps = steps_of_row(grid, row);
-    const Eigen::Vector2d start = frame.base + v * frame.lift;
-    const double scale = steps > 0 ? (1 - v) / steps : 0, depth = frame.base_depth + v * frame.lift_depth;
-    const Eigen::Vector2d step = scale * frame.along;
-    const double a = step.squaredNorm(), b = start.dot(step), c = start.squaredNorm();
-    std::uint32_t first = 0, last = steps;
-    if (a > 0) {
-      const double discriminant = b * b - a * (c - radius2);
-      if (discriminant < 0) continue;
-      const double root = std::sqrt(discriminant);
-      const double low = std::ceil((-b - root) / a), high = std::floor((-b + root) / a);
-      if (high < 0 || low > steps || low > high) continue;
-      first = low > 0 ? static_cast<std::uint32_t>(low) : 0;
-      last = high < steps ? static_cast<std::uint32_t>(high) : steps;
-    } else if (c > radius2) {
-      continue;
-    }
-    for (std::uint32_t i = first; i <= last; ++i)
-      visit(row, i, steps, c + i * (2 * b + i * a), depth + i * scale * frame.along_depth);
-  }
+  rows_.push_back({node_count, 0});
+  doses_.assign(node_count, 0);
 }
 
 void FilmLattice::append_tiles(std::uint32_t triangle, const Spot& spot, std::vector<std::uint32_t>& tiles) const {
   const Grid& grid = grids_[triangle];
   const Eigen::Vector3d area = mesh_.area_vector(triangle);
   if (-spot.direction_O.dot(area) <= kGrazingCosine * area.norm()) return;
-  const Frame frame(corner(triangle, grid, 1), corner(triangle, grid, 2), corner(triangle, grid, 0), spot.center_O,
-                    spot.direction_O, kSpotCutRadii * spot.radius_m);
-  const RowRange rows = frame.rows(grid.row_steps);
+  const Frame frame = frame_of(triangle, spot.center_O, spot.direction_O, kSpotCutRadii * spot.radius_m);
+  const RowRange rows = frame.lines_near(0, grid.rows + 1);
   if (rows.first >= rows.end) return;
   const std::uint32_t first_tile = rows.first / grid.rows_per_tile, last_tile = (rows.end - 1) / grid.rows_per_tile;
   for (std::uint32_t tile = first_tile; tile <= last_tile; ++tile) tiles.push_back(grid.first_tile + tile);
@@ -169,84 +169,83 @@ void FilmLattice::expose(std::uint32_t tile, std::span<const Spot* const> spots)
   const std::uint32_t triangle = tile_triangle_[tile];
   const Grid& grid = grids_[triangle];
   const std::uint32_t tile_first = (tile - grid.first_tile) * grid.rows_per_tile;
-  const std::uint32_t tile_end = std::min(tile_first + grid.rows_per_tile, grid.row_steps + 1);
+  const std::uint32_t tile_end = std::min(tile_first + grid.rows_per_tile, grid.rows + 1);
   const Eigen::Vector3d normal_O = mesh_.area_vector(triangle).normalized();
-  const Eigen::Vector3d& b = corner(triangle, grid, 1);
-  const Eigen::Vector3d& c = corner(triangle, grid, 2);
-  const Eigen::Vector3d& apex = corner(triangle, grid, 0);
   static const double kInside = 1 - std::exp(-2 * kSpotCutRadii * kSpotCutRadii);
 
   for (const Spot* spot : spots) {
-    const Frame frame(b, c, apex, spot->center_O, spot->direction_O, kSpotCutRadii * spot->radius_m);
-    RowRange rows = frame.rows(grid.row_steps);
-    rows = {std::max(rows.first, tile_first), std::min(rows.end, tile_end)};
-    const double radius2 = spot->radius_m * spot->radius_m;
-    const double cosine = -spot->direction_O.dot(normal_O);
+    const Frame frame = frame_of(triangle, spot->center_O, spot->direction_O, kSpotCutRadii * spot->radius_m);
+    const RowRange near = frame.lines_near(0, grid.rows + 1);
+    const double radius2 = spot->radius_m * spot->radius_m, cosine = -spot->direction_O.dot(normal_O);
     const auto peak = static_cast<float>(2 * spot->energy_j * cosine / (std::numbers::pi * radius2 * kInside));
     const auto falloff = static_cast<float>(-2 / radius2);
-    const double window = kDepthWindow * frame.radius;
-    visit_points(
-        triangle, frame, rows, [&](std::uint32_t row, std::uint32_t i, std::uint32_t, double distance2, double depth) {
-          if (std::abs(depth) > window) return;
-          doses_[first_point_[grid.first_row + row] + i] += peak * std::exp(falloff * static_cast<float>(distance2));
-        });
+    const double window = kDepthWindow * frame.radius, row_step = frame.row_step(), column_step = frame.column_step();
+    for (std::uint32_t j = std::max(near.first, tile_first); j < std::min(near.end, tile_end); ++j) {
+      const Row& row = rows_[grid.first_row + j];
+      const std::uint32_t count = rows_[grid.first_row + j + 1].first_node - row.first_node;
+      frame.visit_line(j * row_step, row.first_column * column_step, column_step, count,
+                       [&](std::uint32_t i, double distance2, double depth) {
+                         if (std::abs(depth) > window) return;
+                         doses_[row.first_node + i] += peak * std::exp(falloff * static_cast<float>(distance2));
+                       });
+    }
   }
 }
 
-double FilmLattice::dose_on_row(const Grid& grid, std::uint32_t row, double along) const {
-  const float* doses = &doses_[first_point_[grid.first_row + row]];
-  const std::uint32_t steps = steps_of_row(grid, row);
-  if (steps == 0) return doses[0];
-  const double place = std::clamp(along, 0., 1.) * steps;
-  const std::uint32_t i = std::min(static_cast<std::uint32_t>(place), steps - 1);
-  const double fraction = place - i;
-  return (1 - fraction) * doses[i] + fraction * doses[i + 1];
-}
-
-double FilmLattice::dose_j_m2(const SurfacePoint& point) const {
+FilmLattice::Neighbors FilmLattice::neighbors(const SurfacePoint& point) const {
   const Grid& grid = grids_[point.triangle];
   const double apex = std::clamp(point.barycentric[grid.apex], 0., 1.);
-  const double start = point.barycentric[(grid.apex + 1) % 3], end = point.barycentric[(grid.apex + 2) % 3];
-  const double along = start + end > 0 ? end / (start + end) : .5;
-  const double place = apex * grid.row_steps;
-  const std::uint32_t row = std::min(static_cast<std::uint32_t>(place), grid.row_steps - 1);
-  const double fraction = place - row;
-  return (1 - fraction) * dose_on_row(grid, row, along) + fraction * dose_on_row(grid, row + 1, along);
-}
-
-/// The part of the triangle's area that a row stands for: the integral of its hat function times the width of the
-/// triangle there.
-double FilmLattice::row_area_share(const Grid& grid, std::uint32_t row) const {
-  const double m = grid.row_steps;
-  if (row == 0) return 1 / m - 1 / (3 * m * m);
-  if (row == grid.row_steps) return 1 / (3 * m * m);
-  return 2 * (1 - row / m) / m;
+  const double end = std::clamp(point.barycentric[(grid.apex + 2) % 3], 0., 1.);
+  const double foot = grid.length_m > 0 ? grid.foot_m / grid.length_m : 0;
+  const double y = apex * grid.rows, s = std::min(end + apex * foot, 1.) * grid.columns;
+  const std::uint32_t lower = std::min(static_cast<std::uint32_t>(y), grid.rows - 1);
+  Neighbors neighbors;
+  for (std::uint32_t k = 0; k < 2; ++k) {
+    const Row& row = rows_[grid.first_row + lower + k];
+    const std::uint32_t steps = rows_[grid.first_row + lower + k + 1].first_node - row.first_node - 1;
+    const double place = std::clamp(s - row.first_column, 0., static_cast<double>(steps));
+    const std::uint32_t i = std::min(static_cast<std::uint32_t>(place), steps - 1);
+    const double row_weight = k == 0 ? 1 - (y - lower) : y - lower, along = place - i;
+    for (std::uint32_t n = 0; n < 2; ++n) {
+      neighbors.doses_j_m2[2 * k + n] = doses_[row.first_node + i + n];
+      neighbors.weights[2 * k + n] = row_weight * (n == 0 ? 1 - along : along);
+    }
+  }
+  return neighbors;
 }
 
 void FilmLattice::append_points(std::uint32_t triangle, const Eigen::Vector3d& center_O,
                                 const Eigen::Vector3d& normal_O, double radius_m,
                                 std::vector<FilmPoint>& points) const {
   const Grid& grid = grids_[triangle];
-  const Eigen::Vector3d& b = corner(triangle, grid, 1);
-  const Eigen::Vector3d& c = corner(triangle, grid, 2);
-  const Eigen::Vector3d& apex = corner(triangle, grid, 0);
-  const Frame frame(b, c, apex, center_O, normal_O, radius_m);
-  const double area_m2 = mesh_.area_vector(triangle).norm();
-  visit_points(triangle, frame, frame.rows(grid.row_steps),
-               [&](std::uint32_t row, std::uint32_t i, std::uint32_t steps, double, double depth) {
-                 if (std::abs(depth) > radius_m) return;
-                 const double v = static_cast<double>(row) / grid.row_steps,
-                              t = steps > 0 ? static_cast<double>(i) / steps : 0;
-                 FilmPoint& film_point = points.emplace_back();
-                 film_point.point.triangle = triangle;
-                 film_point.point.barycentric[grid.apex] = v;
-                 film_point.point.barycentric[(grid.apex + 1) % 3] = (1 - v) * (1 - t);
-                 film_point.point.barycentric[(grid.apex + 2) % 3] = (1 - v) * t;
-                 film_point.position_O = v * apex + (1 - v) * ((1 - t) * b + t * c);
-                 const double share = steps == 0 ? 1 : (i == 0 || i == steps ? .5 : 1) / steps;
-                 film_point.area_m2 = area_m2 * row_area_share(grid, row) * share;
-                 film_point.dose_j_m2 = doses_[first_point_[grid.first_row + row] + i];
-               });
+  if (!(grid.height_m > 0)) return;
+  const Frame frame = frame_of(triangle, center_O, normal_O, radius_m);
+  const double row_step = frame.row_step(), column_step = frame.column_step();
+  const RowRange rows = frame.lines_near(0, grid.rows + 1);
+  for (std::uint32_t j = rows.first; j < rows.end; ++j) {
+    const Row& row = rows_[grid.first_row + j];
+    const std::uint32_t count = rows_[grid.first_row + j + 1].first_node - row.first_node;
+    // The band of half a step below to half a step above the row is a trapezium: its width at mid-height times its
+    // height is its area.
+    const double low = std::max(j - .5, 0.) / grid.rows,
+                 high = std::min(j + .5, static_cast<double>(grid.rows)) / grid.rows;
+    const double middle = .5 * (low + high), left = middle * grid.foot_m, right = left + (1 - middle) * grid.length_m;
+    frame.visit_line(
+        j * row_step, row.first_column * column_step, column_step, count, [&](std::uint32_t i, double, double depth) {
+          const double place = (row.first_column + i) * column_step;
+          const double from = std::max(place - .5 * column_step, left), to = std::min(place + .5 * column_step, right);
+          if (from >= to || std::abs(depth) > radius_m) return;
+          const double t = (.5 * (from + to) - left) / (right - left);
+          FilmPoint& film_point = points.emplace_back();
+          film_point.point.triangle = triangle;
+          film_point.point.barycentric[grid.apex] = middle;
+          film_point.point.barycentric[(grid.apex + 1) % 3] = (1 - middle) * (1 - t);
+          film_point.point.barycentric[(grid.apex + 2) % 3] = (1 - middle) * t;
+          film_point.position_O = position(mesh_, film_point.point);
+          film_point.area_m2 = (to - from) * (high - low) * grid.height_m;
+          film_point.dose_j_m2 = doses_[row.first_node + i];
+        });
+  }
 }
 
 }  // namespace hilbrush
