@@ -4,12 +4,14 @@
 
 #include "sampling/textured_mesh.h"
 
-/// What a triangle soup needs before it can be cut and mapped: weld equal positions, drop degenerate and duplicate triangles,
-/// orient neighbours alike (closed components outwards), split what is not manifold. Every repair is counted.
+/// What a triangle soup needs before it can be cut and mapped: weld equal positions, drop degenerate and duplicate
+/// triangles, orient neighbours alike (closed components outwards, open ones as most of their triangles are), split
+/// what is not manifold. Afterwards every edge has one or two triangles and every vertex one fan. Every repair is
+/// counted.
 namespace hilbrush {
 
 struct Repair {
-  std::string what;       ///< "vertices welded", "degenerate triangles dropped", ...
+  std::string what;  ///< "vertices welded", "degenerate triangles dropped", ...
   std::size_t count = 0;
 };
 
@@ -18,7 +20,8 @@ struct RepairedMesh {
   std::vector<Repair> repairs;  ///< only those that happened
 };
 
+/// Takes the mesh by value: hand it over with std::move to spare a copy of its textures.
 /// @throws InputError if nothing with area is left. Cost O(n log n).
-RepairedMesh repair_mesh(const TexturedMesh& mesh);
+RepairedMesh repair_mesh(TexturedMesh mesh);
 
 }  // namespace hilbrush

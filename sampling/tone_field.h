@@ -1,14 +1,30 @@
 #pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "sampling/textured_mesh.h"
 #include "sampling/tone.h"
+#include "sampling/tone_layer.h"
 
-/// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is measured against)
-/// and as asked (after it: the density of dots). Bilinear between texels, linear between vertex colours.
+/// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is
+/// measured against) and as asked (after it: the density of dots). Bilinear between texels, linear between vertex
+/// colours.
 namespace hilbrush {
+
+/// Integrals of the asked coverage over a piece of a triangle, over its area in space.
+struct ToneIntegral {
+  double area_m2 = 0;
+  double mass = 0;                                  ///< m^2: asked coverage times area
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();  ///< asked coverage times (barycentric 1, barycentric 2)
+  double square = 0;  ///< asked coverage squared, for the deviation of equations 7.3 and 7.4
+};
 
 class ToneField {
  public:
-  /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over the texels and triangles.
+  /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over the texels and triangles; four bytes a
+  /// texel.
   ToneField(const TexturedMesh& mesh, const ToneOptions& options);
 
   double wanted(const SurfacePoint& point) const;  ///< 0..1
@@ -18,10 +34,44 @@ class ToneField {
   /// True if the triangle gets no dots whatever its uv: blank by `untextured`, or transparent.
   bool is_blank(std::uint32_t triangle) const;
 
-  // What the exact integrals of sampling need is added here by its owner (asked texels, prefix sums, ...).
+  /// Exact (but for rounding) integrals of asked() over a convex polygon within a triangle; its corners are given by
+  /// their second and third barycentric coordinates, in either sense of rotation. Thread-safe.
+  ToneIntegral integrate(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const;
 
  private:
+  /// What one triangle's tone comes from.
+  struct Source {
+    enum Kind : std::uint8_t { kBlank, kColors, kTexture, kMean } kind = kBlank;
+    std::uint32_t layer = 0;  ///< index into layers_, of kTexture and kMean
+  };
+
+  void choose_sources();
+  Source textured_source(std::uint32_t triangle, const Material& material);
+  std::uint32_t find_layer(int texture, float luminance_factor, double opacity);
+  double coverage(double luminance) const;
+  double asked_for(double wanted) const { return wanted <= 0 ? 0 : options_.curve(wanted); }
+
+  std::array<Eigen::Vector2d, 3> texel_corners(std::uint32_t triangle) const;
+  Eigen::Vector2d texel_at(const SurfacePoint& point) const;
+  TexelAddressing addressing(std::uint32_t triangle) const;
+  double interpolated_luminance(const SurfacePoint& point) const;
+  double wanted_of_texture(const SurfacePoint& point) const;
+
+  ToneIntegral integrate_colors(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const;
+  ToneIntegral integrate_texture(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const;
+
+  /// A texture's asked tones, for one factor of luminance and opacity.
+  struct Layer {
+    int texture = 0;
+    float luminance_factor = 1;  ///< below 0: the texture replaces the surface's colour
+    double opacity = 1;
+    ToneLayer tones;
+  };
+
   const TexturedMesh& mesh_;
+  ToneOptions options_;
+  std::vector<Source> sources_;  ///< per triangle
+  std::vector<Layer> layers_;
 };
 
 }  // namespace hilbrush

@@ -1,0 +1,243 @@
+#include "sampling/tone_field.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sampling/check.h"
+#include "sampling/tone_polygon.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector2d;
+
+/// A triangle that spans more texels than this repeats its texture beyond all sense and is painted in its mean tone.
+constexpr double kMostTexels = 1 << 16;
+/// Least height, in texels, that a triangle gets in its texture: one that is collapsed there would have no polygons to
+/// integrate over.
+constexpr double kLeastTexels = 1e-3;
+
+double cross(const Vector2d& a, const Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// Opens a triangle that is a line or a point in its texture, by a thousandth of a texel.
+void open_collapsed(std::array<Vector2d, 3>& p) {
+  int apex = 0;
+  double longest = -1;
+  for (int k = 0; k < 3; ++k) {
+    const double length = (p[(k + 2) % 3] - p[(k + 1) % 3]).norm();
+    if (length > longest) longest = length, apex = k;
+  }
+  if (longest < kLeastTexels) {
+    p[1] = p[0] + Vector2d(kLeastTexels, 0);
+    p[2] = p[0] + Vector2d(0, kLeastTexels);
+    return;
+  }
+  const Vector2d a = p[(apex + 1) % 3], along = (p[(apex + 2) % 3] - a) / longest;
+  const double height = cross(along, p[apex] - a);
+  if (std::abs(height) >= kLeastTexels) return;
+  const Vector2d across(-along.y(), along.x());
+  p[apex] += (std::copysign(kLeastTexels, height) - height) * across;
+}
+
+bool is_painted_by_untextured_rule(const Material& material, Untextured rule, bool any_colored) {
+  if (material.source != ColorSource::kNone && material.source != ColorSource::kMaterial) return true;
+  return rule == Untextured::kMaterial || (rule == Untextured::kAuto && !any_colored);
+}
+
+}  // namespace
+
+ToneField::ToneField(const TexturedMesh& mesh, const ToneOptions& options) : mesh_(mesh), options_(options) {
+  choose_sources();
+}
+
+void ToneField::choose_sources() {
+  bool any_colored = false;
+  for (const auto m : mesh_.material_index)
+    any_colored |=
+        mesh_.materials[m].source == ColorSource::kColors || mesh_.materials[m].source == ColorSource::kTexture;
+  sources_.resize(mesh_.triangle_count());
+  for (std::uint32_t t = 0; t < mesh_.triangle_count(); ++t) {
+    const Material& material = mesh_.materials[mesh_.material_index[t]];
+    if (material.opacity <= 0 || !is_painted_by_untextured_rule(material, options_.untextured, any_colored)) continue;
+    const bool has_texture = material.source == ColorSource::kTexture && material.texture >= 0;
+    sources_[t] = has_texture ? textured_source(t, material) : Source{Source::kColors, 0};
+  }
+}
+
+ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& material) {
+  float factor = -1;
+  if (mesh_.textures[static_cast<std::size_t>(material.texture)].channels <= 2) {
+    const auto& l = mesh_.corner_luminance[t];
+    factor = l[0] == l[1] && l[1] == l[2] ? l[0] : (l[0] + l[1] + l[2]) / 3;
+  }
+  const Source source{Source::kTexture, find_layer(material.texture, factor, material.opacity)};
+  sources_[t] = source;
+  const auto p = texel_corners(t);
+  for (int k = 0; k < 3; ++k)
+    if (!((p[static_cast<std::size_t>((k + 1) % 3)] - p[static_cast<std::size_t>(k)]).lpNorm<Eigen::Infinity>() <=
+          kMostTexels))
+      return {Source::kMean, source.layer};
+  return source;
+}
+
+std::uint32_t ToneField::find_layer(int texture_index, float luminance_factor, double opacity) {
+  for (std::uint32_t i = 0; i < layers_.size(); ++i)
+    if (layers_[i].texture == texture_index && layers_[i].luminance_factor == luminance_factor &&
+        layers_[i].opacity == opacity)
+      return i;
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(texture_index)];
+  std::vector<float> tones(texture.luminance.size());
+  const double factor = luminance_factor < 0 ? 1 : luminance_factor;
+  for (std::size_t i = 0; i < tones.size(); ++i) {
+    const double texel_opacity = texture.opacity.empty() ? 1 : texture.opacity[i];
+    tones[i] = static_cast<float>(asked_for(coverage(factor * texture.luminance[i]) * texel_opacity * opacity));
+  }
+  layers_.push_back(
+      {texture_index, luminance_factor, opacity, ToneLayer(texture.width, texture.height, std::move(tones))});
+  return static_cast<std::uint32_t>(layers_.size() - 1);
+}
+
+double ToneField::coverage(double luminance) const {
+  return std::clamp(
+      (options_.reflectance_white - luminance) / (options_.reflectance_white - options_.reflectance_black), 0., 1.);
+}
+
+bool ToneField::is_blank(std::uint32_t triangle) const {
+  return sources_[triangle].kind == Source::kBlank;
+}
+
+TexelAddressing ToneField::addressing(std::uint32_t triangle) const {
+  const Material& material = mesh_.materials[mesh_.material_index[triangle]];
+  return {material.repeat_u, material.repeat_v};
+}
+
+std::array<Vector2d, 3> ToneField::texel_corners(std::uint32_t triangle) const {
+  const Material& material = mesh_.materials[mesh_.material_index[triangle]];
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(material.texture)];
+  auto uv = mesh_.corner_uv[triangle];
+  // Whole repeats taken off keep digits for the texels.
+  const Vector2d shift(material.repeat_u ? std::floor(uv[0].x()) : 0, material.repeat_v ? std::floor(uv[0].y()) : 0);
+  for (Vector2d& p : uv) {
+    p -= shift;
+    if (!p.allFinite()) p.setZero();
+    p = Vector2d(p.x() * texture.width - .5, p.y() * texture.height - .5);
+  }
+  open_collapsed(uv);
+  return uv;
+}
+
+Vector2d ToneField::texel_at(const SurfacePoint& point) const {
+  const auto p = texel_corners(point.triangle);
+  return point.barycentric[0] * p[0] + point.barycentric[1] * p[1] + point.barycentric[2] * p[2];
+}
+
+double ToneField::interpolated_luminance(const SurfacePoint& point) const {
+  const auto& l = mesh_.corner_luminance[point.triangle];
+  return point.barycentric[0] * l[0] + point.barycentric[1] * l[1] + point.barycentric[2] * l[2];
+}
+
+double ToneField::wanted_of_texture(const SurfacePoint& point) const {
+  const Material& material = mesh_.materials[mesh_.material_index[point.triangle]];
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(material.texture)];
+  const double factor = texture.channels <= 2 ? interpolated_luminance(point) : 1;
+  return material.opacity *
+         look_up(texture.width, texture.height, texel_at(point), addressing(point.triangle), [&](std::size_t i) {
+           return coverage(factor * texture.luminance[i]) * (texture.opacity.empty() ? 1 : texture.opacity[i]);
+         });
+}
+
+double ToneField::wanted(const SurfacePoint& point) const {
+  const Source source = sources_[point.triangle];
+  if (source.kind == Source::kBlank) return 0;
+  if (source.kind == Source::kColors)
+    return coverage(interpolated_luminance(point)) * mesh_.materials[mesh_.material_index[point.triangle]].opacity;
+  return wanted_of_texture(point);
+}
+
+double ToneField::asked(const SurfacePoint& point) const {
+  const Source source = sources_[point.triangle];
+  switch (source.kind) {
+    case Source::kBlank:
+      return 0;
+    case Source::kColors:
+      return asked_for(wanted(point));
+    case Source::kMean:
+      return layers_[source.layer].tones.mean();
+    case Source::kTexture:
+      break;
+  }
+  return layers_[source.layer].tones.at(texel_at(point), addressing(point.triangle));
+}
+
+ToneIntegral ToneField::integrate(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
+  const Source source = sources_[triangle];
+  switch (source.kind) {
+    case Source::kColors:
+      return integrate_colors(triangle, polygon);
+    case Source::kTexture:
+      return integrate_texture(triangle, polygon);
+    case Source::kBlank:
+    case Source::kMean:
+      break;
+  }
+  const double tone = source.kind == Source::kMean ? layers_[source.layer].tones.mean() : 0;
+  return integrate_linear(
+      polygon, [&](const Vector2d&) { return tone; }, 2 * mesh_.area_vector(triangle).norm());
+}
+
+ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
+  const double scale = 2 * mesh_.area_vector(triangle).norm();
+  const auto& l = mesh_.corner_luminance[triangle];
+  const double opacity = mesh_.materials[mesh_.material_index[triangle]].opacity;
+  if (l[0] == l[1] && l[1] == l[2]) {
+    const double tone = asked_for(coverage(l[0]) * opacity);
+    return integrate_linear(
+        polygon, [&](const Vector2d&) { return tone; }, scale);
+  }
+  const auto luminance = [&](const Vector2d& b) { return l[0] + b.x() * (l[1] - l[0]) + b.y() * (l[2] - l[0]); };
+  const auto tone = [&](const Vector2d& b) { return asked_for(coverage(luminance(b)) * opacity); };
+  // The tone bends where the coverage leaves 0 or 1 and at the curve's knots; between two bends it is linear.
+  const double white = options_.reflectance_white, black = options_.reflectance_black;
+  std::vector<double> bends{white, black};
+  for (const double knot : options_.curve.wanted)
+    if (knot > 0 && knot / opacity < 1) bends.push_back(white - knot / opacity * (white - black));
+  ToneIntegral sum;
+  split_at_levels(polygon, luminance, std::move(bends), [&](std::span<const Vector2d> part) {
+    const ToneIntegral integral = integrate_linear(part, tone, scale);
+    sum.area_m2 += integral.area_m2;
+    sum.mass += integral.mass;
+    sum.first += integral.first;
+    sum.square += integral.square;
+  });
+  return sum;
+}
+
+ToneIntegral ToneField::integrate_texture(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
+  const auto p = texel_corners(triangle);
+  const Vector2d e1 = p[1] - p[0], e2 = p[2] - p[0];
+  std::array<Vector2d, kMostPolygonCorners> texels;
+  CHECK_LE(polygon.size(), texels.size());
+  double twice_area_b = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    texels[i] = p[0] + polygon[i].x() * e1 + polygon[i].y() * e2;
+    twice_area_b += cross(polygon[i] - polygon[0], polygon[(i + 1) % polygon.size()] - polygon[0]);
+  }
+  const double space = 2 * mesh_.area_vector(triangle).norm();
+  ToneIntegral result;
+  result.area_m2 = .5 * std::abs(twice_area_b) * space;
+  if (twice_area_b == 0) return result;
+  const TexelIntegral t =
+      layers_[sources_[triangle].layer].tones.integrate({texels.data(), polygon.size()}, addressing(triangle));
+  // From texels to space; the sign takes care of clockwise polygons and mirrored textures.
+  const double determinant = cross(e1, e2);
+  const double scale = (twice_area_b > 0 ? space : -space) / determinant;
+  const Vector2d first = t.first - t.mass * p[0];
+  result.mass = std::max(0., scale * t.mass);
+  result.first = scale / determinant * Vector2d(cross(first, e2), cross(e1, first));
+  result.square = std::max(0., scale * t.square);
+  return result;
+}
+
+}  // namespace hilbrush
