@@ -188,7 +188,7 @@ std::optional<std::string> nearest_word(const std::string& word, const std::vect
   constexpr std::size_t kLongest = 64;
   if (word.size() > kLongest) return std::nullopt;
   std::optional<std::string> nearest;
-  std::size_t least = std::min<std::size_t>(3, 1 + word.size() / 3);  // fewer changes than this
+  std::size_t least = 1 + std::min<std::size_t>(2, (word.size() + 1) / 3);  // fewer changes than this
   for (const std::string& candidate : words) {
     if (stem(candidate) == stem(word)) return candidate;
     if (const std::size_t distance = edit_distance(word, candidate); distance < least) {

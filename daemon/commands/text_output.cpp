@@ -213,12 +213,21 @@ std::string format_tone_curve(const Json& curve) {
 
 std::string format_job_line(const Json& job) {
   const Json& dots = member(job, "dots");
-  std::string text = "job " + id_text(job) + ": " + text_field(job, "state", "?");
+  const std::string state = text_field(job, "state", "?"), stage = text_field(job, "stage");
+  std::string text = "job " + id_text(job) + ": " + state;
+  if (state == "planning") return text + (stage.empty() ? "" : ", " + stage) + " " + percent_text(job);
   if (const double placed = number_field(dots, "placed"); placed > 0)
     text += ", " + format_count(number_field(dots, "exposed")) + " of " + format_count(placed) + " dots exposed";
-  text += ", " + percent_text(job);
+  if (state == "painting" || state == "paused") text += ", " + percent_text(job);
   if (has_number(job, "eta_s")) text += ", about " + format_duration(number_field(job, "eta_s")) + " left";
   return text;
+}
+
+std::string format_job_error(const Json& job) {
+  const Json& error = member(job, "error");
+  if (!error.is_object()) return error.is_null() ? std::string() : value_text(error);
+  const std::string at = text_field(error, "at"), message = text_field(error, "message");
+  return at.empty() ? message : at + ": " + message;
 }
 
 std::string format_job(const Json& job) {
@@ -229,11 +238,16 @@ std::string format_job(const Json& job) {
                                                     ? ", about " + format_duration(number_field(job, "eta_s")) + " left"
                                                     : ""));
   if (const Json& dots = member(job, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
-  static constexpr std::array kShown{"id", "state", "model", "dry_run", "progress", "eta_s", "dots"};
+  if (const std::string error = format_job_error(job); !error.empty()) text += line("error", error);
+  if (const Json& warnings = member(job, "warnings"); warnings.is_array())
+    for (const Json& warning : warnings) text += line("warning", value_text(warning));
+  static constexpr std::array kShown{"id",    "state", "model", "dry_run", "progress",
+                                     "eta_s", "dots",  "error", "warnings"};
   for (const auto& [key, value] : job.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
-    if (!is_shown && !value.is_null()) text += line(reason_text(key), value_text(value));
+    if (!is_shown && !value.is_null() && !(value.is_structured() && value.empty()))
+      text += line(reason_text(key), value_text(value));
   }
   return text;
 }
@@ -271,7 +285,8 @@ std::string format_cell(const Json& cell) {
   for (const auto& [key, value] : cell.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
-    if (!is_shown && !value.is_null()) text += line(reason_text(key), value_text(value));
+    if (!is_shown && !value.is_null() && !(value.is_structured() && value.empty()))
+      text += line(reason_text(key), value_text(value));
   }
   return text;
 }

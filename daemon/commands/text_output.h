@@ -17,8 +17,10 @@ std::string format_report(const nlohmann::ordered_json& report);
 /// A tone curve as a table of wanted and asked coverage.
 std::string format_tone_curve(const nlohmann::ordered_json& curve);
 
-/// One line: state, counts, ETA.
+/// One line: state, stage or counts, ETA.
 std::string format_job_line(const nlohmann::ordered_json& job);
+/// "cup.wrl:12: no geometry", or nothing.
+std::string format_job_error(const nlohmann::ordered_json& job);
 /// Everything about one job.
 std::string format_job(const nlohmann::ordered_json& job);
 /// A table, one job a line, under a heading.

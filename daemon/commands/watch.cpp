@@ -61,7 +61,8 @@ int watch_job(CommandContext& context, const std::string& id, const std::string&
       job = member(update, "job");
       const std::string state = text_field(job, "state");
       if (context.is_json) context.terminal.out << update.dump() << std::endl;
-      display.show(state, number_field(job, "progress"), format_job_line(job), true);
+      const std::string phase = state == "planning" ? state + " " + text_field(job, "stage") : state;
+      display.show(phase, number_field(job, "progress"), format_job_line(job), state == "painting");
       if (is_reached(state, until)) break;
     }
     update = next_update(client, interrupts);
@@ -69,7 +70,7 @@ int watch_job(CommandContext& context, const std::string& id, const std::string&
   display.finish();
   if (!context.is_json) {
     if (context.terminal.out_is_terminal) context.terminal.out << format_job_line(job) << '\n';
-    if (const std::string error = text_field(job, "error"); !error.empty())
+    if (const std::string error = format_job_error(job); !error.empty())
       context.terminal.err << "hilbrush: job " << printable(id) << ": " << error << '\n';
     if (const std::string output = text_field(job, "output"); text_field(job, "state") == "done" && !output.empty())
       context.terminal.out << "results are in " << output << '\n';
