@@ -1,14 +1,20 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <regex>
 
+#include "tests/support/shell.h"
 #include "tests/tidy/source_tree.h"
 
 /// Layout by clang-format, lint by clang-tidy, and generated data against its generator.
 namespace hilbrush::tidy {
 
+using testing_support::CommandResult;
+using testing_support::find_program;
+using testing_support::run_command;
+
 std::string quoted(const std::string& path) {
-  return "'" + (top_folder() / path).string() + "'";
+  return testing_support::quoted((top_folder() / path).string());
 }
 
 TEST(Format, EveryFileIsAsClangFormatLeavesIt) {
@@ -21,6 +27,32 @@ TEST(Format, EveryFileIsAsClangFormatLeavesIt) {
   const CommandResult result = run_command(formatter + " --dry-run --Werror --ferror-limit=1" + files);
   EXPECT_EQ(result.exit_code, 0) << result.output;
 }
+
+/// A translation unit that reads a heavy header takes half a minute to lint: those wait for tests/run --long.
+bool is_slow_to_lint(const SourceFile& file) {
+  static const std::regex kHeavy(R"(#include <(OpenImageIO|OpenMesh|boost|CLI|SQLiteCpp|spdlog|tbb)/)");
+  return std::regex_search(file.text, kHeavy);
+}
+
+class Lint : public testing::TestWithParam<const char*> {};
+
+TEST_P(Lint, FindsNothing) {
+  const std::string linter = find_program("clang-tidy-14");
+  if (linter.empty()) GTEST_SKIP() << "SKIPPED: clang-tidy-14 is not installed";
+  std::string files;
+  for (const SourceFile& file : source_files()) {
+    if (!file.has_ending(".cpp") || !file.is_below(GetParam())) continue;
+    if (std::getenv("HILBRUSH_LONG") == nullptr && is_slow_to_lint(file)) continue;
+    files += " " + quoted(file.path);
+  }
+  const CommandResult result =
+      run_command(linter + " --quiet -p " + testing_support::quoted(HILBRUSH_BUILD_DIR) + files);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+}
+
+INSTANTIATE_TEST_SUITE_P(Folders, Lint,
+                         testing::Values("sampling", "planner", "drivers", "sim", "config", "daemon/server",
+                                         "daemon/commands"));
 
 TEST(Data, ModelsAreWhatTheirProgramsMake) {
   const std::string python = find_program("python3");

@@ -1,13 +1,18 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <regex>
 #include <set>
 
-#include "tests/tidy/source_tree.h"
+#include "tests/support/shell.h"
 
 /// What the light programs load when they start: the operator's command and the daemon must answer in milliseconds, so
 /// nothing heavy is linked.
 namespace hilbrush::tidy {
+
+using testing_support::CommandResult;
+using testing_support::find_program;
+using testing_support::run_command;
 
 std::string program(const std::string& name) {
   return std::string(HILBRUSH_BUILD_DIR) + "/" + name;
@@ -15,7 +20,7 @@ std::string program(const std::string& name) {
 
 /// Libraries named in the program's dynamic section.
 std::set<std::string> needed_libraries(const std::string& file) {
-  const CommandResult result = run_command("readelf --dynamic --wide '" + file + "'");
+  const CommandResult result = run_command("readelf --dynamic --wide " + testing_support::quoted(file));
   EXPECT_EQ(result.exit_code, 0) << result.output;
   static const std::regex kNeeded(R"(\(NEEDED\)[^\[]*\[([^\]]+)\])");
   std::set<std::string> names;
@@ -26,7 +31,7 @@ std::set<std::string> needed_libraries(const std::string& file) {
 
 /// Everything the program would load, libraries of libraries included.
 std::set<std::string> loaded_libraries(const std::string& file) {
-  const CommandResult result = run_command("ldd '" + file + "'");
+  const CommandResult result = run_command("ldd " + testing_support::quoted(file));
   EXPECT_EQ(result.exit_code, 0) << result.output;
   static const std::regex kLibrary(R"(\s(lib[^\s]+)\s+=>)");
   std::set<std::string> names;

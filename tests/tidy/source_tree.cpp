@@ -1,14 +1,9 @@
 #include "tests/tidy/source_tree.h"
 
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <fstream>
-#include <memory>
 #include <sstream>
-#include <stdexcept>
 
 namespace hilbrush::tidy {
 namespace fs = std::filesystem;
@@ -70,23 +65,6 @@ std::vector<SourceFile> read_source_files() {
 const std::vector<SourceFile>& source_files() {
   static const std::vector<SourceFile> files = read_source_files();
   return files;
-}
-
-CommandResult run_command(const std::string& command) {
-  CommandResult result;
-  FILE* pipe = popen(("( " + command + " ) 2>&1").c_str(), "r");
-  if (!pipe) throw std::runtime_error("can't run " + command);
-  std::array<char, 4096> buffer;
-  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
-    result.output.append(buffer.data(), count);
-  const int status = pclose(pipe);
-  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return result;
-}
-
-std::string find_program(const std::string& name) {
-  const CommandResult result = run_command("command -v " + name);
-  return result.exit_code == 0 ? result.output.substr(0, result.output.find('\n')) : "";
 }
 
 }  // namespace hilbrush::tidy

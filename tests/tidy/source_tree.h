@@ -27,13 +27,4 @@ const std::vector<SourceFile>& source_files();
 /// Every file of the project, relative to the top, sorted.
 std::vector<std::string> all_files();
 
-/// Runs a shell command; what it printed (both streams) and its exit code.
-struct CommandResult {
-  int exit_code = 0;
-  std::string output;
-};
-CommandResult run_command(const std::string& command);
-/// The full path of a program, or "".
-std::string find_program(const std::string& name);
-
 }  // namespace hilbrush::tidy

@@ -1,0 +1,34 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+/// What tests need of the system around them.
+namespace hilbrush::testing_support {
+
+struct CommandResult {
+  int exit_code = 0;   ///< 128 + the signal's number if it was killed by one
+  std::string output;  ///< both streams
+};
+/// Runs a shell command to its end.
+CommandResult run_command(const std::string& command);
+
+/// In single quotes, for a shell.
+std::string quoted(const std::string& text);
+
+/// The full path of a program, or "".
+std::string find_program(const std::string& name);
+
+/// A new folder that goes with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace hilbrush::testing_support
