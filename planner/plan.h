@@ -66,6 +66,9 @@ struct Plan {
 /// Cost: O(dots), memory O(dots).
 Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress& progress = {});
 
+/// How long a program takes from home to home, by the time model.
+TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program);
+
 /// The checked way from measured joints to exposure `next` of the program: way-points, possibly none (the direct move
 /// is clear).
 /// @throws InputError if there is no clear way.
