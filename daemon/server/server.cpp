@@ -1,1 +1,363 @@
-// replaced
+// The one translation unit that includes Asio. <utility> comes first because Asio 1.18 forgets it under C++20.
+#include "daemon/server/server.h"
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
+#include <csignal>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <set>
+#include <unordered_set>
+#include <utility>
+
+#include "sampling/check.h"
+
+namespace hilbrush {
+namespace {
+
+namespace asio = boost::asio;
+using Stream = asio::local::stream_protocol;
+
+Peer peer_of(Stream::socket& socket) {
+  ucred credentials{};
+  socklen_t length = sizeof credentials;
+  CHECK(::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &credentials, &length) == 0);
+  return {credentials.uid, credentials.gid, credentials.pid};
+}
+
+/// The answers of one batch; sent as one line when the last has come.
+struct Batch {
+  std::size_t awaited = 0;
+  std::string text;
+};
+
+}  // namespace
+
+/// One connection. Lives as long as an operation of its socket does.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  using Goodbye = std::function<void(const std::shared_ptr<Session>&)>;
+
+  Session(Stream::socket socket, const ServerLimits& limits, const MethodTable& methods, const JobBook& book,
+          Goodbye goodbye)
+      : socket_(std::move(socket)),
+        limits_(limits),
+        methods_(methods),
+        book_(book),
+        goodbye_(std::move(goodbye)),
+        peer_(peer_of(socket_)) {}
+
+  void begin() { read(); }
+  void close();
+  void notify(const Job& job);
+
+ private:
+  void read();
+  void take(std::size_t count);
+  void serve_lines();
+  void serve(std::string_view line);
+  void answer(const RpcElement& element, std::function<void(std::string)> send);
+  Caller caller();
+  bool may_serve() const { return unread_bytes() < limits_.unread_bytes && pending_replies_ < limits_.pending_replies; }
+  std::size_t unread_bytes() const { return outbox_.size() + writing_.size(); }
+  void send(const std::string& line);
+  void write();
+  void tell_news();
+  void close_if_done();
+
+  Stream::socket socket_;
+  const ServerLimits limits_;
+  const MethodTable& methods_;
+  const JobBook& book_;
+  const Goodbye goodbye_;
+  const Peer peer_;
+  std::array<char, 65536> chunk_{};
+  std::string inbox_;             ///< bytes not yet served: at most a line and a chunk
+  std::size_t searched_ = 0;      ///< of inbox_: holds no end of line before
+  std::string outbox_, writing_;  ///< not yet handed to the system, being handed
+  std::size_t pending_replies_ = 0;
+  std::set<std::int64_t> watched_, news_;  ///< jobs; those of them that changed since they were last told
+  bool is_reading_ = false, is_writing_ = false, is_at_end_ = false, is_closed_ = false, is_serving_ = false;
+};
+
+void Session::read() {
+  if (is_reading_ || is_at_end_ || is_closed_ || !may_serve()) return;
+  is_reading_ = true;
+  socket_.async_read_some(asio::buffer(chunk_),
+                          [self = shared_from_this()](const boost::system::error_code& error, std::size_t count) {
+                            self->is_reading_ = false;
+                            if (self->is_closed_) return;
+                            if (error == asio::error::eof)
+                              self->is_at_end_ = true;
+                            else if (error)
+                              return self->close();
+                            self->take(count);
+                          });
+}
+
+void Session::take(std::size_t count) {
+  inbox_.append(chunk_.data(), count);
+  serve_lines();
+}
+
+/// As long as the client reads what it is answered; else the rest waits, and nothing more is read.
+void Session::serve_lines() {
+  if (is_serving_ || is_closed_) return;
+  is_serving_ = true;
+  std::size_t begin = 0;
+  while (!is_closed_ && may_serve()) {
+    const auto end = inbox_.find('\n', std::max(begin, searched_));
+    if (end == std::string::npos) {
+      searched_ = inbox_.size();
+      break;
+    }
+    const std::string_view line(inbox_.data() + begin, end - begin);
+    if (line.size() > limits_.line_bytes) break;
+    serve(line);
+    begin = searched_ = end + 1;
+  }
+  inbox_.erase(0, begin);
+  searched_ -= std::min(searched_, begin);
+  is_serving_ = false;
+  if (inbox_.size() > limits_.line_bytes && inbox_.find('\n') > limits_.line_bytes) {
+    inbox_.clear();
+    searched_ = 0;
+    is_at_end_ = true;
+    send(rpc_fault(nullptr, {kRpcParse, "a message has at most " + std::to_string(limits_.line_bytes) + " bytes", ""}));
+  }
+  close_if_done();
+  read();
+}
+
+void Session::serve(std::string_view line) {
+  if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
+  const RpcMessage message = parse_rpc(line);
+  const std::weak_ptr<Session> weak = weak_from_this();
+  if (!message.is_batch) {
+    return answer(message.elements.front(), [weak](const std::string& text) {
+      if (const auto self = weak.lock()) self->send(text);
+    });
+  }
+  const auto batch = std::make_shared<Batch>();
+  for (const auto& element : message.elements) {
+    const auto* request = std::get_if<RpcRequest>(&element.content);
+    if (request == nullptr || !request->is_notification) ++batch->awaited;
+  }
+  for (const auto& element : message.elements)
+    answer(element, [weak, batch](const std::string& text) {
+      batch->text += (batch->text.empty() ? "[" : ",") + text;
+      if (--batch->awaited > 0) return;
+      if (const auto self = weak.lock()) self->send(batch->text + "]");
+    });
+}
+
+Caller Session::caller() {
+  const std::weak_ptr<Session> weak = weak_from_this();
+  return {peer_,
+          [weak](std::int64_t job) {
+            if (const auto self = weak.lock()) self->watched_.insert(job);
+          },
+          [weak](std::int64_t job) {
+            if (const auto self = weak.lock()) {
+              self->watched_.erase(job);
+              self->news_.erase(job);
+            }
+          }};
+}
+
+void Session::answer(const RpcElement& element, std::function<void(std::string)> send) {
+  if (const auto* fault = std::get_if<RpcFault>(&element.content)) return send(rpc_fault(element.id, *fault));
+  const auto& request = std::get<RpcRequest>(element.content);
+  if (request.is_notification)
+    return methods_.dispatch(request, caller(), {[](const Json&) {}, [](const RpcFault&) {}});
+  ++pending_replies_;
+  const std::weak_ptr<Session> weak = weak_from_this();
+  const auto finish = [weak, send = std::move(send)](const std::string& text) {
+    if (const auto self = weak.lock()) {
+      --self->pending_replies_;
+      send(text);
+      self->serve_lines();
+    }
+  };
+  methods_.dispatch(request, caller(),
+                    {[finish, id = request.id](Json result) { finish(rpc_result(id, std::move(result))); },
+                     [finish, id = request.id](const RpcFault& fault) { finish(rpc_fault(id, fault)); }});
+}
+
+void Session::send(const std::string& line) {
+  if (is_closed_) return;
+  outbox_ += line;
+  outbox_ += '\n';
+  write();
+}
+
+void Session::write() {
+  if (is_writing_ || is_closed_ || outbox_.empty()) return;
+  is_writing_ = true;
+  writing_ = std::exchange(outbox_, {});
+  asio::async_write(socket_, asio::buffer(writing_),
+                    [self = shared_from_this()](const boost::system::error_code& error, std::size_t) {
+                      self->is_writing_ = false;
+                      self->writing_.clear();
+                      if (self->is_closed_) return;
+                      if (error) return self->close();
+                      self->write();
+                      self->tell_news();
+                      self->serve_lines();
+                    });
+}
+
+void Session::notify(const Job& job) {
+  if (!watched_.contains(job.id)) return;
+  news_.insert(job.id);
+  tell_news();
+}
+
+/// News go out when nothing else waits to be read, each with the state as it is then: a slow client gets fewer of them,
+/// never a queue.
+void Session::tell_news() {
+  if (is_writing_ || is_closed_ || is_at_end_) return;
+  for (const std::int64_t id : std::exchange(news_, {})) {
+    const auto job = book_.jobs().find(id);
+    if (job != book_.jobs().end())
+      send(rpc_notification("job.update", {{"seq", job->second.seq}, {"job", job_to_json(job->second)}}));
+  }
+}
+
+/// A client that has closed its side still gets what it asked for.
+void Session::close_if_done() {
+  const bool has_request = inbox_.find('\n') != std::string::npos;
+  if (is_at_end_ && !is_closed_ && !has_request && pending_replies_ == 0 && outbox_.empty() && !is_writing_) close();
+}
+
+void Session::close() {
+  if (std::exchange(is_closed_, true)) return;
+  boost::system::error_code ignored;
+  socket_.close(ignored);
+  goodbye_(shared_from_this());
+}
+
+struct Server::Implementation {
+  explicit Implementation(const ServerLimits& server_limits) : limits(server_limits) {}
+
+  ServerLimits limits;
+  asio::io_context context{1};
+  asio::executor_work_guard<asio::io_context::executor_type> work{context.get_executor()};
+  Stream::acceptor acceptor{context};
+  asio::signal_set signals{context};
+  asio::steady_timer retry{context}, poll_timer{context};
+  std::filesystem::path socket_file;
+  std::unordered_set<std::shared_ptr<Session>> sessions;
+
+  void accept(const MethodTable& methods, const JobBook& book) {
+    acceptor.async_accept([this, &methods, &book](const boost::system::error_code& error, Stream::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (error) {  // out of descriptors, most likely: others will close theirs
+        retry.expires_after(std::chrono::milliseconds(100));
+        retry.async_wait([this, &methods, &book](const boost::system::error_code& aborted) {
+          if (!aborted) accept(methods, book);
+        });
+        return;
+      }
+      // Beyond the limit the connection is closed at once, which the client sees.
+      if (sessions.size() < limits.clients) {
+        const auto session =
+            std::make_shared<Session>(std::move(socket), limits, methods, book,
+                                      [this](const std::shared_ptr<Session>& gone) { sessions.erase(gone); });
+        sessions.insert(session);
+        session->begin();
+      }
+      accept(methods, book);
+    });
+  }
+
+  void poll(std::chrono::steady_clock::duration period, std::function<bool()> task) {
+    poll_timer.expires_after(period);
+    poll_timer.async_wait([this, period, task = std::move(task)](const boost::system::error_code& error) {
+      if (!error && !task()) poll(period, task);
+    });
+  }
+};
+
+Server::Server(const ServerLimits& limits) : implementation_(std::make_unique<Implementation>(limits)) {}
+
+Server::~Server() {
+  // Sessions say goodbye as they close; the set must not change under the loop.
+  const auto sessions = std::exchange(implementation_->sessions, {});
+  for (const auto& session : sessions) session->close();
+  if (!implementation_->socket_file.empty()) ::unlink(implementation_->socket_file.c_str());
+}
+
+void Server::post(std::function<void()> task) {
+  asio::post(implementation_->context, std::move(task));
+}
+
+void Server::listen(const std::filesystem::path& socket, const MethodTable& methods, const JobBook& book) {
+  const auto fail = [&](const std::string& sentence) { throw std::runtime_error(socket.string() + ": " + sentence); };
+  if (socket.string().size() >= sizeof(sockaddr_un::sun_path)) fail("is too long for a socket's path");
+  struct stat status {};
+  if (::lstat(socket.c_str(), &status) == 0) {
+    if (!S_ISSOCK(status.st_mode)) fail("exists and is no socket");
+    if (::unlink(socket.c_str()) != 0)
+      fail(std::string("what an earlier daemon left can't be removed: ") + std::strerror(errno));
+  }
+  auto& acceptor = implementation_->acceptor;
+  boost::system::error_code error;
+  acceptor.open(Stream(), error);
+  if (error) fail("no socket can be made: " + error.message());
+  // Nobody may connect before the mode is as it shall be, whatever the umask: bound for nobody, opened to the group,
+  // then listened on.
+  const mode_t before = ::umask(0777);
+  acceptor.bind(Stream::endpoint(socket.string()), error);
+  ::umask(before);
+  if (error) fail("can't be bound: " + error.message());
+  implementation_->socket_file = socket;
+  if (::chmod(socket.c_str(), 0660) != 0) fail(std::string("its mode can't be set: ") + std::strerror(errno));
+  acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (error) fail("can't be listened on: " + error.message());
+  implementation_->accept(methods, book);
+}
+
+void Server::notify(const Job& job) {
+  // A session may close itself while it is told.
+  const auto sessions = implementation_->sessions;
+  for (const auto& session : sessions) session->notify(job);
+}
+
+std::size_t Server::client_count() const {
+  return implementation_->sessions.size();
+}
+
+void Server::on_termination(std::function<void()> task) {
+  implementation_->signals.add(SIGTERM);
+  implementation_->signals.add(SIGINT);
+  implementation_->signals.async_wait([task = std::move(task)](const boost::system::error_code& error, int) {
+    if (!error) task();
+  });
+}
+
+void Server::poll(double period_s, std::function<bool()> task) {
+  implementation_->poll(
+      std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s)),
+      std::move(task));
+}
+
+void Server::run() {
+  implementation_->context.run();
+}
+
+void Server::end_run() {
+  implementation_->context.stop();
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,54 @@
+#include "daemon/server/audit_log.h"
+
+#include <fcntl.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <stdexcept>
+
+namespace hilbrush {
+namespace {
+
+constexpr std::size_t kSummaryBytes = 300;
+
+std::string utc_now_ms() {
+  timeval now{};
+  ::gettimeofday(&now, nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now.tv_sec, &utc);
+  char text[40], whole[48];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+  std::snprintf(whole, sizeof whole, "%s.%03dZ", text, static_cast<int>(now.tv_usec / 1000));
+  return whole;
+}
+
+}  // namespace
+
+AuditLog::AuditLog(const std::filesystem::path& file)
+    : fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0640)) {
+  if (fd_ < 0) throw std::runtime_error(file.string() + ": can't be opened: " + std::strerror(errno));
+}
+
+AuditLog::~AuditLog() {
+  ::close(fd_);
+}
+
+void AuditLog::record(const Peer& peer, const std::string& method, const Json& params,
+                      const std::string& result) noexcept {
+  try {
+    std::string summary =
+        params.dump(-1, ' ', true, Json::error_handler_t::replace);  // ASCII: control characters can't forge lines
+    if (summary.size() > kSummaryBytes) summary.resize(kSummaryBytes);
+    const Json line{{"time", utc_now_ms()}, {"uid", peer.uid},   {"pid", peer.pid},
+                    {"method", method},     {"params", summary}, {"result", result}};
+    const std::string text = line.dump(-1, ' ', true, Json::error_handler_t::replace) + "\n";
+    [[maybe_unused]] const ssize_t written = ::write(fd_, text.data(), text.size());
+  } catch (const std::exception&) {
+  }
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,27 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "daemon/server/job_book.h"
+
+/// Who did what: one line an act (requests that only look are not recorded) with time, uid, pid, method, a summary of
+/// the parameters, and the result. Appended to, never rewritten; rotation is the system's. Socket thread only.
+namespace hilbrush {
+
+class AuditLog {
+ public:
+  /// @throws std::runtime_error naming the file.
+  explicit AuditLog(const std::filesystem::path& file);
+  ~AuditLog();
+  AuditLog(const AuditLog&) = delete;
+  AuditLog& operator=(const AuditLog&) = delete;
+
+  /// `result`: "ok" or the fault's sentence. A line that can't be written is lost: a full disk must not keep anyone
+  /// from stopping the cell.
+  void record(const Peer& peer, const std::string& method, const Json& params, const std::string& result) noexcept;
+
+ private:
+  int fd_ = -1;
+};
+
+}  // namespace hilbrush

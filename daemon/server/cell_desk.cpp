@@ -1,0 +1,155 @@
+#include "daemon/server/cell_desk.h"
+
+#include <numbers>
+
+namespace hilbrush {
+namespace {
+
+Json axes_json(const char* state, const std::string& fault) {
+  return {{"state", state}, {"fault", fault.empty() ? Json(nullptr) : Json(fault)}};
+}
+
+/// Millimetres and degrees: for people.
+Json joints_json(const Robot::Positions& robot, const Table::Positions& table) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  return {{"j1_deg", robot[kJ1] * kDegrees}, {"j2_deg", robot[kJ2] * kDegrees}, {"j3_mm", robot[kJ3] * 1e3},
+          {"j4_deg", robot[kJ4] * kDegrees}, {"a_deg", table[0] * kDegrees},    {"c_deg", table[1] * kDegrees}};
+}
+
+}  // namespace
+
+CellDesk::CellDesk(CellThread& thread, CellDevices& devices, const CellDescription& description)
+    : thread_(thread), devices_(devices), description_(description) {}
+
+const char* CellDesk::state_name() const {
+  switch (state_) {
+    case State::kStopped:
+      return "stopped";
+    case State::kClearing:
+      return "clearing";
+    case State::kIdle:
+      return "idle";
+    case State::kArming:
+      return "arming";
+    case State::kArmed:
+      return "armed";
+    case State::kHoming:
+      return "homing";
+    case State::kPainting:
+      return "painting";
+  }
+  return "unknown";
+}
+
+void CellDesk::refuse(const std::string& act) const {
+  throw RpcFault{kRpcWrongState, "the cell is " + std::string(state_name()) + ": " + act, ""};
+}
+
+Json CellDesk::stop(const std::string& reason) {
+  is_laser_proved_off_ = thread_.stop();
+  state_ = State::kStopped;
+  reason_ = reason;
+  job_.clear();
+  ++stops_;
+  if (waiting_clear_) {
+    const Reply overtaken = *std::exchange(waiting_clear_, std::nullopt);
+    overtaken.fault({kRpcWrongState, "the cell was stopped again before it was cleared", ""});
+  }
+  if (on_stop) on_stop();
+  return status();
+}
+
+/// While the executor still comes to rest after a stop, its flag must stay up: the clear waits.
+void CellDesk::clear(Reply reply) {
+  if (state_ != State::kStopped) refuse("there is no stop to clear");
+  if (waiting_clear_) refuse("it is being cleared already");
+  if (thread_.is_busy())
+    waiting_clear_ = std::move(reply);
+  else
+    begin_clear(std::move(reply));
+}
+
+void CellDesk::note_executor_at_rest() {
+  if (!waiting_clear_ || thread_.is_busy()) return;
+  begin_clear(*std::exchange(waiting_clear_, std::nullopt));
+}
+
+void CellDesk::begin_clear(Reply reply) {
+  thread_.release_stop();
+  state_ = State::kClearing;
+  thread_.clear([this, reply = std::move(reply), stops = stops_](std::optional<CellFault> fault) {
+    if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped again while it was cleared", ""});
+    finish_act(reply, State::kIdle, fault);
+  });
+}
+
+void CellDesk::arm(Reply reply) {
+  if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
+  if (state_ != State::kIdle) refuse("it can be armed only when idle");
+  state_ = State::kArming;
+  thread_.arm([this, reply = std::move(reply), stops = stops_](std::optional<CellFault> fault) {
+    if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped while it was armed", ""});
+    finish_act(reply, State::kArmed, fault);
+  });
+}
+
+void CellDesk::home(Reply reply) {
+  if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
+  if (state_ != State::kIdle && state_ != State::kArmed) refuse("it can be homed only when idle or armed");
+  const State before = std::exchange(state_, State::kHoming);
+  thread_.home([this, reply = std::move(reply), before, stops = stops_](std::optional<CellFault> fault) {
+    if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped on its way home", ""});
+    finish_act(reply, before, fault);
+  });
+}
+
+/// A device that fails stops the cell: the operator looks, then clears.
+void CellDesk::finish_act(const Reply& reply, State reached, const std::optional<CellFault>& fault) {
+  if (fault) {
+    stop(fault->sentence);
+    reply.fault({kRpcDeviceFault, fault->sentence, "cell"});
+    return;
+  }
+  state_ = reached;
+  reply.result(status());
+}
+
+void CellDesk::begin_painting(const std::string& job) {
+  if (state_ == State::kStopped) refuse("clear it (cell.clear) and arm it (cell.arm) before a job can paint");
+  if (state_ == State::kIdle) refuse("arm it (cell.arm) before a job can paint");
+  if (state_ == State::kPainting) refuse("job " + job_ + " is being painted");
+  if (state_ != State::kArmed) refuse("a job can paint only when it is armed");
+  state_ = State::kPainting;
+  job_ = job;
+}
+
+void CellDesk::end_painting(bool stays_armed) {
+  job_.clear();
+  if (state_ != State::kPainting) return;
+  state_ = stays_armed ? State::kArmed : State::kIdle;
+  if (!stays_armed) thread_.disarm();
+}
+
+Json CellDesk::status() {
+  const Cell cell = devices_.cell();
+  const auto robot = cell.robot.status();
+  const auto table = cell.table.status();
+  const auto laser = cell.laser.status();
+  Json json;
+  json["state"] = state_name();
+  json["laser"] = laser.is_emitting ? "on" : is_laser_proved_off_ ? "off" : "unconfirmed";
+  json["interlock"] = laser.interlock_closed ? "closed" : "open";
+  json["job"] = job_.empty() ? Json(nullptr) : Json(job_);
+  json["reason"] = state_ == State::kStopped ? Json(reason_) : Json(nullptr);
+  json["joints"] = joints_json(robot.positions, table.positions);
+  json["devices"] = {{"robot", axes_json(device_state_name(robot.state), robot.fault)},
+                     {"table", axes_json(device_state_name(table.state), table.fault)},
+                     {"laser", axes_json(device_state_name(laser.state), laser.fault)}};
+  json["name"] = description_.name;
+  json["sha256"] = description_.sha256;
+  json["simulated"] = devices_.is_simulated();
+  if (devices_.is_simulated()) json["time_scale"] = description_.simulation.time_scale;
+  return {{"cell", std::move(json)}};
+}
+
+}  // namespace hilbrush

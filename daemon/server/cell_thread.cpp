@@ -1,0 +1,293 @@
+#include "daemon/server/cell_thread.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+
+#include "drivers/driver_error.h"
+#include "planner/program_file.h"
+#include "planner/sha256.h"
+#include "sampling/check.h"
+
+namespace hilbrush {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+
+constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+constexpr double kAtRest = 1e-6;  ///< rad or m: the axes are still where the approach begins
+
+/// The job's own files are to blame.
+struct JobFilesFault : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+std::string file_sha256(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw JobFilesFault(file.string() + ": can't be read");
+  Sha256 hash;
+  std::vector<char> block(std::size_t{1} << 18);
+  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0)
+    hash.update(std::string_view(block.data(), static_cast<std::size_t>(in.gcount())));
+  return hash.hex_digest();
+}
+
+void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
+  const auto refuse = [](const char* what) {
+    throw JobFilesFault(std::string("the program was made for ") + what +
+                        "; a program is never run on another cell or model");
+  };
+  if (found.cell_sha256 != description.sha256) refuse("another cell file");
+  if (found.model_sha256 != order.model_sha256) refuse("another model");
+  if (found.settings_sha256 != order.settings_sha256) refuse("other settings");
+}
+
+}  // namespace
+
+CellThread::CellThread(CellDevices& devices, const CellDescription& description, Post post)
+    : devices_(devices), cell_(devices.cell()), description_(description), post_(std::move(post)) {
+  control_.stop.store(true);  // the cell starts stopped
+  thread_ = std::thread([this] { run(); });
+}
+
+CellThread::~CellThread() {
+  stop();
+  {
+    const std::lock_guard lock(mutex_);
+    is_ending_ = true;
+    tasks_.clear();
+  }
+  woken_.notify_all();
+  thread_.join();
+}
+
+bool CellThread::stop() noexcept {
+  return request_stop(cell_, control_);
+}
+
+void CellThread::push(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    CHECK_LT(tasks_.size(), kQueueMax);  // acts wait for each other's answers, so only a few can ever be under way
+    tasks_.push_back(std::move(task));
+  }
+  woken_.notify_all();
+}
+
+void CellThread::run() {
+  for (;;) {
+    std::function<void()> task;
+    {
+      std::unique_lock lock(mutex_);
+      woken_.wait(lock, [this] { return is_ending_ || !tasks_.empty(); });
+      if (is_ending_) return;
+      task = std::move(tasks_.front());
+      tasks_.pop_front();
+    }
+    task();
+  }
+}
+
+/// Does `work` on the executor's thread and calls `answer` with its result on the socket thread.
+template <class Work, class Answer>
+void CellThread::order(Work work, Answer answer) {
+  ++orders_under_way_;
+  push([this, work = std::move(work), answer = std::move(answer)]() mutable {
+    auto result = std::make_shared<decltype(work())>(work());
+    post_([this, result, answer = std::move(answer)]() mutable {
+      --orders_under_way_;
+      answer(std::move(*result));
+    });
+  });
+}
+
+void CellThread::act(std::function<void()> work, Done done) {
+  order(
+      [work = std::move(work)]() -> std::optional<CellFault> {
+        try {
+          work();
+          return std::nullopt;
+        } catch (const std::exception& error) {
+          return CellFault{error.what(), false};
+        }
+      },
+      std::move(done));
+}
+
+void CellThread::clear(Done done) {
+  act(
+      [this] {
+        const auto bring_back = [](auto& device) {
+          if (device.status().state == DeviceState::kFault) device.clear_fault();
+          if (device.status().state == DeviceState::kDisconnected) device.connect();
+        };
+        bring_back(cell_.laser);
+        if (!cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
+        bring_back(cell_.robot);
+        bring_back(cell_.table);
+        if (cell_.robot.status().state == DeviceState::kConnected) cell_.robot.enable();
+        if (cell_.table.status().state == DeviceState::kConnected) cell_.table.enable();
+      },
+      std::move(done));
+}
+
+void CellThread::arm(Done done) {
+  act([this] { arm_devices(); }, std::move(done));
+}
+
+/// A stop may come at any instant of this: its flag is looked at after emission has been armed, so that one of the two
+/// always undoes it.
+void CellThread::arm_devices() {
+  const auto check_stop = [this] {
+    if (control_.stop.load()) throw DriverError("the cell was stopped");
+  };
+  check_stop();
+  if (cell_.robot.status().state == DeviceState::kEnabled) cell_.robot.home();
+  if (cell_.table.status().state == DeviceState::kEnabled) cell_.table.home();
+  check_stop();
+  if (cell_.laser.status().state == DeviceState::kConnected) cell_.laser.enable();
+  if (control_.stop.load()) cell_.laser.disable();
+  check_stop();
+}
+
+void CellThread::home(Done done) {
+  act([this] { travel_home(); }, std::move(done));
+}
+
+void CellThread::travel_home() {
+  if (cell_.robot.status().state == DeviceState::kEnabled) cell_.robot.home();
+  if (cell_.table.status().state == DeviceState::kEnabled) cell_.table.home();
+  Joints up = true_joints();
+  up[kJ3] = std::max(up[kJ3], description_.axes[kJ3].home);
+  Joints table = up;
+  table[kTilt] = description_.axes[kTilt].home;
+  table[kRotation] = description_.axes[kRotation].home;
+  Joints home;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) home[axis] = description_.axes[axis].home;
+  const ExecutionResult result = travel({up, table, home}, cell_, description_, control_);
+  if (result.outcome != ExecutionOutcome::kFinished) throw DriverError(result.reason);
+}
+
+void CellThread::disarm() {
+  push([this] { cell_.laser.disable(); });
+}
+
+Joints CellThread::true_joints() const {
+  const auto robot = cell_.robot.status().positions;
+  const auto table = cell_.table.status().positions;
+  return {robot[0], robot[1], robot[2], robot[3], table[0], table[1]};
+}
+
+CellThread::Loaded CellThread::load(const PaintOrder& order, bool may_create) const {
+  const auto program_file = order.folder / "program.ply";
+  const auto journal_file = order.folder / "journal";
+  try {
+    ExposureProgram program = read_program(program_file);
+    check_provenance(program.provenance, order, description_);
+    const std::string sha256 = file_sha256(program_file);
+    Journal journal = may_create && !std::filesystem::exists(journal_file)
+                          ? Journal::create(journal_file, program.exposures.size(), sha256)
+                          : Journal::open(journal_file, sha256);
+    if (journal.exposure_count() != program.exposures.size())
+      throw JobFilesFault("the journal does not fit the program");
+    return {std::move(program), std::move(journal), {}};
+  } catch (const JobFilesFault&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw JobFilesFault(error.what());
+  }
+}
+
+PaintTally CellThread::tally(const Loaded& loaded) {
+  PaintTally tally;
+  tally.exposed = loaded.journal.done_count();
+  for (const std::size_t i : loaded.journal.in_doubt()) tally.in_doubt.push_back(loaded.program.exposures[i].dot_index);
+  return tally;
+}
+
+void CellThread::prepare(PaintOrder wanted, std::function<void(Prepared)> done) {
+  order(
+      [this, wanted = std::move(wanted)]() -> Prepared {
+        Prepared prepared;
+        try {
+          loaded_.reset();
+          loaded_.emplace(load(wanted, true));
+          Journal& journal = loaded_->journal;
+          if (wanted.exposes_in_doubt)
+            for (const std::size_t i : journal.in_doubt()) journal.expose_again(i);
+          for (std::size_t i = 0; i < journal.exposure_count() && !prepared.next; ++i)
+            if (journal.state(i) == ExposureState::kRemaining) prepared.next = i;
+          devices_.record_emissions(wanted.folder / "emissions.ply");
+          prepared.tally = tally(*loaded_);
+          prepared.from = loaded_->from = true_joints();
+        } catch (const std::exception& error) {
+          loaded_.reset();
+          prepared.fault = CellFault{error.what(), dynamic_cast<const JobFilesFault*>(&error) != nullptr};
+        }
+        return prepared;
+      },
+      std::move(done));
+}
+
+void CellThread::paint(std::vector<Joints> approach, std::function<void(std::size_t)> on_progress,
+                       std::function<void(ExecutionResult, PaintTally)> done) {
+  using Painted = std::pair<ExecutionResult, PaintTally>;
+  order(
+      [this, approach = std::move(approach), on_progress = std::move(on_progress)]() -> Painted {
+        CHECK(loaded_.has_value());
+        ExecutionResult result;
+        const Joints now = true_joints();
+        const bool is_at_rest = std::equal(now.begin(), now.end(), loaded_->from.begin(),
+                                           [](double a, double b) { return std::abs(a - b) <= kAtRest; });
+        if (is_at_rest) {
+          auto last_told = Steady::now();
+          result = execute(loaded_->program, approach, cell_, description_, loaded_->journal, control_,
+                           [&](std::size_t exposed) {
+                             const auto time = Steady::now();
+                             if (time - last_told < kProgressInterval) return;
+                             last_told = time;
+                             post_([on_progress, exposed] { on_progress(exposed); });
+                           });
+        } else {
+          result.outcome = ExecutionOutcome::kFailed;
+          result.reason = "the axes moved while the approach was planned";
+        }
+        try {
+          loaded_->journal.close_window();
+          devices_.record_emissions({});
+        } catch (const std::exception& error) {
+          result.outcome = ExecutionOutcome::kFailed;
+          result.reason = error.what();
+        }
+        Painted painted{result, tally(*loaded_)};
+        loaded_.reset();
+        return painted;
+      },
+      [done = std::move(done)](Painted painted) { done(std::move(painted.first), std::move(painted.second)); });
+}
+
+void CellThread::release() {
+  push([this] {
+    loaded_.reset();
+    try {
+      devices_.record_emissions({});
+    } catch (const std::exception&) {  // closing a record can't fail in a way that matters here
+    }
+  });
+}
+
+void CellThread::inspect(PaintOrder wanted, std::function<void(std::optional<PaintTally>)> done) {
+  order(
+      [this, wanted = std::move(wanted)]() -> std::optional<PaintTally> {
+        try {
+          return tally(load(wanted, false));
+        } catch (const std::exception&) {
+          return std::nullopt;
+        }
+      },
+      std::move(done));
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,127 @@
+#pragma once
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/executor.h"
+#include "daemon/journal.h"
+#include "daemon/server/cell_devices.h"
+
+/// The executor's thread: the only one that commands motion. Orders come from the socket thread through a queue of at
+/// most kQueueMax; answers go back as closures posted to the socket thread. stop() alone acts from the caller's thread,
+/// at once.
+namespace hilbrush {
+
+/// Hands a closure to the socket thread. Any thread.
+using Post = std::function<void(std::function<void()>)>;
+
+/// What to paint, and what its program must have been made from.
+struct PaintOrder {
+  std::filesystem::path folder;  ///< program.ply, journal, emissions.ply
+  std::string model_sha256, settings_sha256;
+  bool exposes_in_doubt = false;  ///< the operator orders the dots in doubt again
+};
+
+/// How far a job is, by its journal.
+struct PaintTally {
+  std::size_t exposed = 0;
+  std::vector<std::uint32_t> in_doubt;  ///< dot indices, in the program's order
+};
+
+/// Why an order was not carried out.
+struct CellFault {
+  std::string sentence;
+  bool is_program_at_fault = false;  ///< the job's files are to blame, not the cell
+};
+
+struct Prepared {
+  std::optional<CellFault> fault;
+  PaintTally tally;
+  std::optional<std::size_t> next;  ///< first exposure still to make; none: nothing is left
+  Joints from{};                    ///< where the axes really are
+};
+
+class CellThread {
+ public:
+  static constexpr std::size_t kQueueMax = 16;
+  using Done = std::function<void(std::optional<CellFault>)>;
+
+  /// `devices` and `description` outlive it.
+  CellThread(CellDevices& devices, const CellDescription& description, Post post);
+  /// Stops, and waits for the thread; nothing is posted any more.
+  ~CellThread();
+  CellThread(const CellThread&) = delete;
+  CellThread& operator=(const CellThread&) = delete;
+
+  /// Laser off, emission disabled, axes stopped; latched until release_stop(). Any thread. @return true if the laser
+  /// confirms.
+  bool stop() noexcept;
+  bool is_stop_latched() const { return control_.stop.load(); }
+  /// The run ends between two dots. Socket thread, as everything below; callbacks are posted there.
+  void pause() { control_.pause.store(true); }
+  /// Before a run begins.
+  void resume() { control_.pause.store(false); }
+  /// Only while nothing runs.
+  void release_stop() { control_.stop.store(false); }
+  /// True while an order is queued or carried out, as the socket thread knows it.
+  bool is_busy() const { return orders_under_way_ > 0; }
+
+  /// Devices connected, their faults cleared, drives on. Nothing moves.
+  void clear(Done done);
+  /// Axes ready (those that have lost their reference find it now), then the laser's emission armed.
+  void arm(Done done);
+  /// To the home position: up first, then table, then arm, in the dark.
+  void home(Done done);
+  /// The laser's emission disarmed: at the end of a job.
+  void disarm();
+  /// Reads the program and the journal (made at a job's first start), checks where they come from, reads the true
+  /// joints.
+  void prepare(PaintOrder order, std::function<void(Prepared)> done);
+  /// Paints what prepare() has read. Progress comes at most ten times a second.
+  void paint(std::vector<Joints> approach, std::function<void(std::size_t exposed)> on_progress,
+             std::function<void(ExecutionResult, PaintTally)> done);
+  /// Lets go of what prepare() has read.
+  void release();
+  /// What the journal of a job that does not run says.
+  void inspect(PaintOrder order, std::function<void(std::optional<PaintTally>)> done);
+
+ private:
+  struct Loaded {
+    ExposureProgram program;
+    Journal journal;
+    Joints from{};
+  };
+  template <class Work, class Answer>
+  void order(Work work, Answer answer);
+  void push(std::function<void()> task);
+  void run();
+  Loaded load(const PaintOrder& order, bool may_create) const;
+  static PaintTally tally(const Loaded& loaded);
+  Joints true_joints() const;
+  void arm_devices();
+  void travel_home();
+  void act(std::function<void()> work, Done done);
+
+  CellDevices& devices_;
+  const Cell cell_;
+  const CellDescription& description_;
+  const Post post_;
+  ExecutionControl control_;
+  int orders_under_way_ = 0;      ///< the socket thread's
+  std::optional<Loaded> loaded_;  ///< the executor thread's
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  std::deque<std::function<void()>> tasks_;  ///< guarded by mutex_
+  bool is_ending_ = false;                   ///< guarded by mutex_
+  std::thread thread_;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,165 @@
+#include "daemon/server/daemon.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+
+#include "config/cell_file.h"
+#include "daemon/server/audit_log.h"
+#include "daemon/server/cell_desk.h"
+#include "daemon/server/cell_devices.h"
+#include "daemon/server/cell_thread.h"
+#include "daemon/server/job_book.h"
+#include "daemon/server/job_store.h"
+#include "daemon/server/method_table.h"
+#include "daemon/server/pipeline_child.h"
+#include "daemon/server/server.h"
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Held as long as the daemon lives: two daemons never share a state folder, a socket or a cell. The file stays; only
+/// the lock on it counts.
+class LockFile {
+ public:
+  LockFile(const fs::path& file, const std::string& held)
+      : fd_(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640)) {
+    if (fd_ < 0) throw std::runtime_error(file.string() + ": can't be opened: " + std::strerror(errno));
+    if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
+    ::close(fd_);
+    throw std::runtime_error(held + ": another hilbrushd uses it");
+  }
+  ~LockFile() { ::close(fd_); }
+  LockFile(const LockFile&) = delete;
+  LockFile& operator=(const LockFile&) = delete;
+
+ private:
+  int fd_;
+};
+
+fs::path made_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder))
+    throw std::runtime_error(folder.string() + ": can't be made or is no folder" +
+                             (error ? ": " + error.message() : ""));
+  return fs::canonical(folder);
+}
+
+CellDescription described_cell(const fs::path& file, const std::optional<double>& time_scale) {
+  CellDescription description = load_cell(file);
+  if (!time_scale) return description;
+  if (!(*time_scale >= 0 && *time_scale <= 1000)) throw InputError("--time-scale", "must be 0 to 1000");
+  if (description.devices.robot != "simulated")
+    throw InputError("--time-scale", "is for simulated cells only: real time can't be scaled");
+  description.simulation.time_scale = *time_scale;
+  return description;
+}
+
+}  // namespace
+
+/// Built from top to bottom, taken down from bottom to top: threads that call back end before what they call.
+struct Daemon::Implementation {
+  DaemonOptions options;
+  fs::path state;
+  LockFile state_lock, socket_lock;
+  fs::path cell_file;
+  CellDescription description;
+  std::string notice;
+  JobStore store;
+  AuditLog audit;
+  std::unique_ptr<CellDevices> devices;
+  std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+  Server server;
+  Post post{[this](std::function<void()> task) { server.post(std::move(task)); }};
+  CellThread thread;
+  PipelineChildren children;
+  CellDesk desk;
+  JobBook book;
+  MethodTable methods;
+  bool is_ending = false;  ///< the socket thread's
+
+  explicit Implementation(const DaemonOptions& given)
+      : options(given),
+        state(made_folder(given.state)),
+        state_lock(state / "lock", state.string()),
+        socket_lock(given.socket.string() + ".lock", given.socket.string()),
+        cell_file(fs::absolute(find_cell(given.cell))),
+        description(described_cell(cell_file, given.time_scale)),
+        store(state / "jobs.sqlite", &notice),
+        audit(state / "audit.log"),
+        devices(make_cell_devices(description)),
+        thread(*devices, description, post),
+        children(given.pipeline,
+                 ChildLimits{.silence_s = given.pipeline_silence_s, .resident_bytes = given.pipeline_memory_mb << 20}),
+        desk(thread, *devices, description),
+        book({made_folder(state / "jobs"), cell_file}, store, desk, thread, children, description, post),
+        methods(book, desk, audit, [this] { return info(); }) {
+    book.on_change = [this](const Job& job) { server.notify(job); };
+    book.restore();
+    server.listen(options.socket, methods, book);
+  }
+
+  Json info() const {
+    const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - begin;
+    return {{"version", HILBRUSH_VERSION},
+            {"pid", ::getpid()},
+            {"uptime_s", uptime.count()},
+            {"socket", options.socket.string()},
+            {"state", state.string()},
+            {"cell_file", cell_file.string()},
+            {"pipeline", options.pipeline.string()},
+            {"pipeline_silence_s", options.pipeline_silence_s},
+            {"pipeline_memory_mb", options.pipeline_memory_mb},
+            {"clients", server.client_count()},
+            {"jobs", book.jobs().size()}};
+  }
+
+  /// Laser off first; then the executor is waited for, so that the job's last state is kept.
+  void end() {
+    if (std::exchange(is_ending, true)) return;
+    desk.stop("the daemon ends");
+    book.shut_down();
+    constexpr double kPeriodS = 0.01;
+    constexpr auto kPatience = std::chrono::seconds(10);
+    server.poll(kPeriodS, [this, deadline = std::chrono::steady_clock::now() + kPatience] {
+      if ((thread.is_busy() || book.is_painting()) && std::chrono::steady_clock::now() < deadline) return false;
+      server.end_run();
+      return true;
+    });
+  }
+};
+
+Daemon::Daemon(const DaemonOptions& options) : implementation_(std::make_unique<Implementation>(options)) {}
+Daemon::~Daemon() = default;
+
+void Daemon::end_on_signals() {
+  implementation_->server.on_termination([this] { implementation_->end(); });
+}
+
+void Daemon::run() {
+  implementation_->server.run();
+}
+
+void Daemon::end() {
+  implementation_->server.post([this] { implementation_->end(); });
+}
+
+void Daemon::laser_off() noexcept {
+  implementation_->devices->cell().laser.off();
+  implementation_->devices->cell().laser.disable();
+}
+
+const std::string& Daemon::notice() const {
+  return implementation_->notice;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,52 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+/// hilbrushd as a value: everything that lives between its start and its end. The program's main and the tests hold one
+/// each.
+///
+///   socket thread (Asio)      Server, MethodTable, JobBook, CellDesk, JobStore, AuditLog: all state of jobs and cell
+///   executor's thread         CellThread: the only one that commands motion
+///   children's thread         PipelineChildren: starts and watches hilbrush-pipeline, copies models
+/// They hand over closures; nothing is shared but the executor's stop and pause flags, and the devices' own thread-safe
+/// calls.
+namespace hilbrush {
+
+struct DaemonOptions {
+  std::filesystem::path socket;             ///< of the operator's command, mode 0660
+  std::filesystem::path state;              ///< folder: jobs.sqlite, jobs/, audit.log, lock
+  std::string cell = "default";             ///< name of a cell or a file
+  std::optional<double> time_scale;         ///< instead of the cell file's; simulated cells only
+  std::filesystem::path pipeline;           ///< the program hilbrush-pipeline
+  double pipeline_silence_s = 60;           ///< a child that says nothing for so long is killed
+  std::uint64_t pipeline_memory_mb = 8192;  ///< a child that grows beyond is killed
+};
+
+class Daemon {
+ public:
+  /// Everything up and listening. @throws std::runtime_error (InputError for the cell file) with a sentence.
+  explicit Daemon(const DaemonOptions& options);
+  ~Daemon();
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  /// SIGTERM and SIGINT end the daemon in order. Before run().
+  void end_on_signals();
+  /// Serves until end(): then the laser is off, the cell stopped, a painting job paused.
+  void run();
+  /// Any thread.
+  void end();
+  /// The beam off at once, for the last moments of a process that is about to abort. Any thread, never throws.
+  void laser_off() noexcept;
+  /// Something the operator should read at start-up, such as a job store that had to be set aside; or empty.
+  const std::string& notice() const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,187 @@
+#include "daemon/server/job_store.h"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <array>
+#include <chrono>
+#include <stdexcept>
+
+namespace hilbrush {
+namespace {
+
+/// Step i brings a database from version i to i + 1. Steps are added, never changed.
+constexpr std::array<const char*, 1> kMigrations{R"(
+  CREATE TABLE job (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    key TEXT UNIQUE,
+    uid INTEGER NOT NULL, gid INTEGER NOT NULL,
+    state TEXT NOT NULL,
+    model TEXT NOT NULL, model_copy TEXT NOT NULL, model_sha256 TEXT NOT NULL,
+    settings TEXT NOT NULL, settings_sha256 TEXT NOT NULL, cell TEXT NOT NULL,
+    dry_run INTEGER NOT NULL,
+    created TEXT NOT NULL,
+    placed INTEGER NOT NULL, skipped INTEGER NOT NULL, exposed INTEGER NOT NULL,
+    planned_s REAL NOT NULL,
+    error_at TEXT, error_message TEXT,
+    warnings TEXT NOT NULL);
+)"};
+
+constexpr const char* kColumns =
+    "key, uid, gid, state, model, model_copy, model_sha256, settings, settings_sha256, cell, dry_run, created, placed, "
+    "skipped, exposed, "
+    "planned_s, error_at, error_message, warnings";
+
+void migrate(SQLite::Database& database) {
+  const int version = database.execAndGet("PRAGMA user_version").getInt();
+  if (version > static_cast<int>(kMigrations.size()))
+    throw std::runtime_error("it was written by a newer hilbrushd (version " + std::to_string(version) + ")");
+  for (auto step = static_cast<std::size_t>(version); step < kMigrations.size(); ++step) {
+    SQLite::Transaction transaction(database);
+    database.exec(kMigrations[step]);
+    database.exec("PRAGMA user_version = " + std::to_string(step + 1));
+    transaction.commit();
+  }
+}
+
+std::unique_ptr<SQLite::Database> open_checked(const std::filesystem::path& file) {
+  auto database = std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  database->setBusyTimeout(2000);
+  if (const std::string answer = database->execAndGet("PRAGMA quick_check").getString(); answer != "ok")
+    throw std::runtime_error("it is damaged: " + answer);
+  database->exec("PRAGMA journal_mode = WAL");
+  database->exec("PRAGMA synchronous = FULL");
+  migrate(*database);
+  return database;
+}
+
+void bind(SQLite::Statement& statement, const Job& job) {
+  int i = 0;
+  const auto text = [&](const std::string& value) { statement.bind(++i, value); };
+  const auto number = [&](std::uint64_t value) { statement.bind(++i, static_cast<std::int64_t>(value)); };
+  const auto text_or_null = [&](bool has_value, const std::string& value) {
+    if (has_value)
+      text(value);
+    else
+      statement.bind(++i);
+  };
+  text_or_null(!job.key.empty(), job.key);
+  number(job.uid);
+  number(job.gid);
+  text(job_state_name(job.state));
+  text(job.model.string());
+  text(job.model_copy.string());
+  text(job.model_sha256);
+  text(job.settings);
+  text(job.settings_sha256);
+  text(job.cell);
+  number(job.dry_run ? 1 : 0);
+  text(job.created);
+  number(job.placed);
+  number(job.skipped);
+  number(job.exposed);
+  statement.bind(++i, job.planned_s);
+  text_or_null(job.error.has_value(), job.error ? job.error->at : "");
+  text_or_null(job.error.has_value(), job.error ? job.error->message : "");
+  text(Json(job.warnings).dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+Job read_job(SQLite::Statement& row) {
+  Job job;
+  int i = 0;
+  const auto text = [&] { return row.getColumn(i++).getString(); };
+  const auto number = [&] { return static_cast<std::uint64_t>(row.getColumn(i++).getInt64()); };
+  job.id = row.getColumn(i++).getInt64();
+  job.key = text();
+  job.uid = static_cast<std::uint32_t>(number());
+  job.gid = static_cast<std::uint32_t>(number());
+  const std::string state = text();
+  job.state = job_state_from_name(state).value_or(JobState::kFailed);
+  job.model = text();
+  job.model_copy = text();
+  job.model_sha256 = text();
+  job.settings = text();
+  job.settings_sha256 = text();
+  job.cell = text();
+  job.dry_run = number() != 0;
+  job.created = text();
+  job.placed = number();
+  job.skipped = number();
+  job.exposed = number();
+  job.planned_s = row.getColumn(i++).getDouble();
+  if (!row.getColumn(i + 1).isNull())
+    job.error = JobError{row.getColumn(i).getString(), row.getColumn(i + 1).getString()};
+  i += 2;
+  const Json warnings = Json::parse(text(), nullptr, false);
+  if (warnings.is_array())
+    for (const auto& warning : warnings)
+      if (warning.is_string()) job.warnings.push_back(warning.get<std::string>());
+  return job;
+}
+
+/// The database and what SQLite keeps beside it.
+std::filesystem::path set_file_aside(const std::filesystem::path& file) {
+  const auto seconds =
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  const std::filesystem::path aside = file.string() + ".damaged-" + std::to_string(seconds);
+  std::error_code ignored;
+  for (const char* suffix : {"", "-wal", "-shm"})
+    std::filesystem::rename(file.string() + suffix, aside.string() + suffix, ignored);
+  return aside;
+}
+
+}  // namespace
+
+struct JobStore::Implementation {
+  std::unique_ptr<SQLite::Database> database;
+};
+
+JobStore::JobStore(const std::filesystem::path& file, std::string* set_aside)
+    : implementation_(std::make_unique<Implementation>()) {
+  try {
+    implementation_->database = open_checked(file);
+    return;
+  } catch (const std::exception& error) {
+    if (!std::filesystem::exists(file))
+      throw std::runtime_error(file.string() + ": no job store can be made: " + error.what());
+    const auto aside = set_file_aside(file);
+    if (set_aside != nullptr)
+      *set_aside = file.string() + " can't be used (" + error.what() + "); it was set aside as " +
+                   aside.filename().string() + " and the daemon starts without jobs";
+  }
+  try {
+    implementation_->database = open_checked(file);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(file.string() + ": no job store can be made: " + error.what());
+  }
+}
+
+JobStore::~JobStore() = default;
+
+void JobStore::insert(Job& job) {
+  std::string marks = "?";
+  for (int i = 1; i < 19; ++i) marks += ", ?";
+  SQLite::Statement statement(*implementation_->database,
+                              std::string("INSERT INTO job (") + kColumns + ") VALUES (" + marks + ")");
+  bind(statement, job);
+  statement.exec();
+  job.id = implementation_->database->getLastInsertRowid();
+}
+
+void JobStore::update(const Job& job) {
+  std::string marks = "?";
+  for (int i = 1; i < 19; ++i) marks += ", ?";
+  SQLite::Statement statement(*implementation_->database,
+                              std::string("UPDATE job SET (") + kColumns + ") = (" + marks + ") WHERE id = ?");
+  bind(statement, job);
+  statement.bind(20, job.id);
+  statement.exec();
+}
+
+std::vector<Job> JobStore::load_all() {
+  std::vector<Job> jobs;
+  SQLite::Statement rows(*implementation_->database, std::string("SELECT id, ") + kColumns + " FROM job ORDER BY id");
+  while (rows.executeStep()) jobs.push_back(read_job(rows));
+  return jobs;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,274 @@
+#include "daemon/server/method_table.h"
+
+#include <algorithm>
+
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+Json object_schema(Json properties, std::vector<std::string> required) {
+  return {{"type", "object"},
+          {"properties", std::move(properties)},
+          {"required", std::move(required)},
+          {"additionalProperties", false}};
+}
+
+Json no_params() {
+  return object_schema(Json::object(), {});
+}
+
+Json id_schema() {
+  return {{"type", "string"}, {"minLength", 1}, {"maxLength", 40}, {"description", "the job's id"}};
+}
+
+Json job_params() {
+  return object_schema({{"id", id_schema()}}, {"id"});
+}
+
+/// Schemas of results stand in components.schemas of the OpenRPC document.
+Json reference(const char* name) {
+  return {{"$ref", std::string("#/components/schemas/") + name}};
+}
+
+Json result_with(const char* key, Json schema) {
+  return {{"type", "object"}, {"properties", {{key, std::move(schema)}}}, {"required", {key}}};
+}
+
+Json typed(const char* type, const char* description) {
+  return {{"type", type}, {"description", description}};
+}
+
+Json nullable(const char* type, const char* description) {
+  return {{"type", {type, "null"}}, {"description", description}};
+}
+
+Json job_schema() {
+  Json states = Json::array();
+  for (const auto state : {JobState::kQueued, JobState::kPlanning, JobState::kReady, JobState::kPainting,
+                           JobState::kPaused, JobState::kDone, JobState::kFailed, JobState::kCancelled})
+    states.push_back(job_state_name(state));
+  const Json count = {{"type", "integer"}, {"minimum", 0}};
+  Json properties = {
+      {"id", typed("string", "identifies the job")},
+      {"state", {{"type", "string"}, {"enum", states}}},
+      {"model", typed("string", "as submitted")},
+      {"dry_run", typed("boolean", "computed only: opens no device")},
+      {"dots",
+       {{"type", "object"},
+        {"properties",
+         {{"placed", count}, {"exposed", count}, {"in_doubt", count}, {"remaining", count}, {"skipped", count}}},
+        {"description", "placed = exposed + in_doubt + remaining + skipped"}}},
+      {"stage", nullable("string", "what is being done")},
+      {"progress", typed("number", "0 to 1: of the stage while planning, of the dots while painting")},
+      {"eta_s", nullable("number", "seconds of painting left")},
+      {"output", typed("string", "the job's folder")},
+      {"error",
+       {{"type", {"object", "null"}},
+        {"properties", {{"at", {{"type", "string"}}}, {"message", {{"type", "string"}}}}}}},
+      {"in_doubt", typed("array", "indices of the dots that may have been exposed, at most 1000")},
+      {"warnings", typed("array", "sentences of the pipeline")},
+      {"model_copy", nullable("string", "the model in the job's folder")},
+      {"settings", typed("object", "all settings, defaults filled in")},
+      {"created", typed("string", "ISO 8601, UTC")},
+      {"key", nullable("string", "idempotency key")}};
+  return {{"type", "object"}, {"properties", std::move(properties)}};
+}
+
+Json cell_schema() {
+  return {{"type", "object"},
+          {"properties",
+           {{"state",
+             {{"type", "string"}, {"enum", {"stopped", "clearing", "idle", "arming", "armed", "homing", "painting"}}}},
+            {"laser", {{"type", "string"}, {"enum", {"off", "on", "unconfirmed"}}}},
+            {"interlock", {{"type", "string"}, {"enum", {"closed", "open"}}}},
+            {"job", nullable("string", "the job that is being painted")},
+            {"reason", nullable("string", "why the cell is stopped")},
+            {"joints", typed("object", "measured; the unit is in the key")},
+            {"devices", typed("object", "state and fault of each device")},
+            {"name", typed("string", "of the cell file")},
+            {"sha256", typed("string", "of the cell file")},
+            {"simulated", typed("boolean", "no real device moves")},
+            {"time_scale", typed("number", "wall seconds of one simulated second; 0: as fast as possible")}}}};
+}
+
+std::string id_of(const Json& params) {
+  return params.at("id").get<std::string>();
+}
+
+Json job_result(const Job& job) {
+  return {{"job", job_to_json(job)}};
+}
+
+}  // namespace
+
+MethodTable::MethodTable(JobBook& book, CellDesk& desk, AuditLog& audit, std::function<Json()> info) : audit_(audit) {
+  add_job_methods(book);
+  add_cell_methods(desk);
+  add_system_methods(std::move(info));
+}
+
+void MethodTable::add_job_methods(JobBook& book) {
+  const Json job = result_with("job", reference("Job"));
+  const auto add_act = [&](const char* name, const char* summary, Json params,
+                           std::function<Job&(const Json&, const Caller&)> act) {
+    methods_.push_back({name, summary, true, std::move(params), job,
+                        [act = std::move(act)](const Json& given, const Caller& caller, const Reply& reply) {
+                          reply.result(job_result(act(given, caller)));
+                        }});
+  };
+  const Json submit_params = object_schema(
+      {{"model",
+        {{"type", "string"},
+         {"minLength", 1},
+         {"maxLength", 4096},
+         {"description", "absolute path, read with the submitter's rights"}}},
+       {"settings", typed("object", "see the job file: dpi or dots, size_mm or units_mm, ...")},
+       {"dry_run", typed("boolean", "compute the whole job, open no device")},
+       {"key",
+        {{"type", "string"}, {"maxLength", 200}, {"description", "idempotency key: the same key is the same job"}}}},
+      {"model"});
+  add_act("job.submit", "Takes a model; answers at once, the job is queued.", submit_params,
+          [&book](const Json& given, const Caller& caller) -> Job& {
+            return book.submit({given.at("model").get<std::string>(), given.value("settings", Json::object()),
+                                given.value("dry_run", false), given.value("key", "")},
+                               caller.peer);
+          });
+  const Json part = {{"const", true}, {"description", "the operator confirms that the part is in its place"}};
+  add_act("job.start", "Paints a ready job; the cell must be armed.",
+          object_schema({{"id", id_schema()}, {"part_in_place", part}}, {"id", "part_in_place"}),
+          [&book](const Json& given, const Caller&) -> Job& { return book.start(id_of(given)); });
+  add_act("job.pause", "Ends painting between two dots.", job_params(),
+          [&book](const Json& given, const Caller&) -> Job& { return book.pause(id_of(given)); });
+  const Json in_doubt = {{"type", "string"},
+                         {"enum", {"leave", "expose"}},
+                         {"description", "what becomes of the dots in doubt; default: leave"}};
+  add_act("job.resume", "Goes on with a paused job; the cell must be armed.",
+          object_schema({{"id", id_schema()}, {"part_in_place", part}, {"in_doubt", in_doubt}}, {"id"}),
+          [&book](const Json& given, const Caller&) -> Job& {
+            return book.resume(id_of(given), given.value("in_doubt", "leave") == "expose");
+          });
+  add_act("job.cancel", "Gives a job up for good.", job_params(),
+          [&book](const Json& given, const Caller&) -> Job& { return book.cancel(id_of(given)); });
+
+  methods_.push_back(
+      {"job.get", "One job.", false, job_params(), job, [&book](const Json& given, const Caller&, const Reply& reply) {
+         reply.result(job_result(book.get(id_of(given))));
+       }});
+  methods_.push_back(
+      {"job.list", "Jobs, the newest first.", false,
+       object_schema(
+           {{"limit", {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000}, {"description", "default 100"}}}}, {}),
+       result_with("jobs", {{"type", "array"}, {"items", reference("Job")}}),
+       [&book](const Json& given, const Caller&, const Reply& reply) {
+         Json jobs = Json::array();
+         const auto limit = given.value("limit", std::size_t{100});
+         for (auto entry = book.jobs().rbegin(); entry != book.jobs().rend() && jobs.size() < limit; ++entry)
+           jobs.push_back(job_to_json(entry->second));
+         reply.result({{"jobs", std::move(jobs)}});
+       }});
+  Json watched = result_with("job", reference("Job"));
+  watched["properties"]["seq"] =
+      typed("integer", "of this state; job.update notifications that follow have higher ones, some may be passed over");
+  methods_.push_back(
+      {"job.watch",
+       "The job now, and from now on a job.update notification {seq, job} for each change, over this connection.",
+       false, job_params(), watched, [&book](const Json& given, const Caller& caller, const Reply& reply) {
+         const Job& found = book.get(id_of(given));
+         caller.watch(found.id);
+         reply.result({{"seq", found.seq}, {"job", job_to_json(found)}});
+       }});
+  methods_.push_back({"job.unwatch", "No more job.update notifications of this job over this connection.", false,
+                      job_params(), job, [&book](const Json& given, const Caller& caller, const Reply& reply) {
+                        const Job& found = book.get(id_of(given));
+                        caller.unwatch(found.id);
+                        reply.result(job_result(found));
+                      }});
+}
+
+void MethodTable::add_cell_methods(CellDesk& desk) {
+  const Json cell = result_with("cell", reference("Cell"));
+  methods_.push_back({"cell.status", "The cell's state, laser, interlock, joints and devices.", false, no_params(),
+                      cell, [&desk](const Json&, const Caller&, const Reply& reply) { reply.result(desk.status()); }});
+  methods_.push_back({"cell.stop", "Laser off, axes stopped, at once and latched; a painting job is paused.", true,
+                      no_params(), cell, [&desk](const Json&, const Caller& caller, const Reply& reply) {
+                        reply.result(desk.stop("stopped by user " + std::to_string(caller.peer.uid)));
+                      }});
+  methods_.push_back({"cell.clear", "Takes a stop back; nothing moves.", true, no_params(), cell,
+                      [&desk](const Json&, const Caller&, Reply reply) { desk.clear(std::move(reply)); }});
+  methods_.push_back({"cell.arm", "Axes ready, laser armed for one job; answered when its start delay is over.", true,
+                      no_params(), cell,
+                      [&desk](const Json&, const Caller&, Reply reply) { desk.arm(std::move(reply)); }});
+  methods_.push_back(
+      {"cell.home",
+       "All axes to their home positions in the dark: up first, then the table, then the arm; answered when there.",
+       true, no_params(), cell, [&desk](const Json&, const Caller&, Reply reply) { desk.home(std::move(reply)); }});
+}
+
+void MethodTable::add_system_methods(std::function<Json()> info) {
+  methods_.push_back({"system.info", "The daemon: version, uptime, folders, limits.", false, no_params(),
+                      result_with("system", {{"type", "object"}}),
+                      [info = std::move(info)](const Json&, const Caller&, const Reply& reply) {
+                        reply.result({{"system", info()}});
+                      }});
+  methods_.push_back({"rpc.discover",
+                      "This table as an OpenRPC document.",
+                      false,
+                      no_params(),
+                      {{"type", "object"}},
+                      [this](const Json&, const Caller&, const Reply& reply) { reply.result(discover()); }});
+}
+
+void MethodTable::dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const {
+  const auto method =
+      std::find_if(methods_.begin(), methods_.end(), [&](const Method& known) { return known.name == request.method; });
+  if (method == methods_.end())
+    return reply.fault({kRpcUnknownMethod,
+                        "there is no method \"" + request.method.substr(0, 60) + "\"; rpc.discover lists them", ""});
+  if (method->is_act) {
+    const auto record = [this, peer = caller.peer, name = method->name, params = request.params](
+                            const std::string& result) { audit_.record(peer, name, params, result); };
+    Reply inner = std::move(reply);
+    reply.result = [record, answer = inner.result](Json result) {
+      record("ok");
+      answer(std::move(result));
+    };
+    reply.fault = [record, answer = inner.fault](RpcFault fault) {
+      record(fault.message);
+      answer(std::move(fault));
+    };
+  }
+  try {
+    if (auto fault = check_schema(request.params, method->params)) return reply.fault(std::move(*fault));
+    method->handler(request.params, caller, reply);
+  } catch (const RpcFault& fault) {
+    reply.fault(fault);
+  } catch (const InputError& error) {
+    reply.fault({kRpcBadInput, error.sentence(), error.at()});
+  } catch (const std::exception& error) {
+    reply.fault({kRpcInternal, std::string("the daemon failed: ") + error.what(), ""});
+  }
+}
+
+Json MethodTable::discover() const {
+  Json methods = Json::array();
+  for (const Method& method : methods_) {
+    Json params = Json::array();
+    const auto& required = method.params.at("required");
+    for (const auto& [name, schema] : method.params.at("properties").items())
+      params.push_back({{"name", name},
+                        {"required", std::find(required.begin(), required.end(), name) != required.end()},
+                        {"schema", schema}});
+    methods.push_back({{"name", method.name},
+                       {"summary", method.summary},
+                       {"paramStructure", "by-name"},
+                       {"params", std::move(params)},
+                       {"result", {{"name", "result"}, {"schema", method.result}}}});
+  }
+  return {{"openrpc", "1.2.6"},
+          {"info", {{"title", "hilbrushd"}, {"version", HILBRUSH_VERSION}}},
+          {"methods", std::move(methods)},
+          {"components", {{"schemas", {{"Job", job_schema()}, {"Cell", cell_schema()}}}}}};
+}
+
+}  // namespace hilbrush

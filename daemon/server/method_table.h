@@ -1,0 +1,49 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "daemon/server/audit_log.h"
+#include "daemon/server/cell_desk.h"
+#include "daemon/server/job_book.h"
+#include "daemon/server/json_rpc.h"
+
+/// Every method of the socket in one table: its name, what it does, the schemas of its parameters and result, and its
+/// handler. Requests are dispatched and checked by it, and rpc.discover prints it, so that the three can't differ.
+/// Socket thread only.
+namespace hilbrush {
+
+/// The connection a request came over.
+struct Caller {
+  Peer peer;
+  std::function<void(std::int64_t job)> watch, unwatch;
+};
+
+struct Method {
+  std::string name, summary;
+  bool is_act = false;  ///< recorded in the audit log
+  Json params, result;  ///< JSON schemas
+  std::function<void(const Json& params, const Caller& caller, Reply reply)> handler;
+};
+
+class MethodTable {
+ public:
+  /// `info` answers system.info.
+  MethodTable(JobBook& book, CellDesk& desk, AuditLog& audit, std::function<Json()> info);
+
+  /// Answers once, now or later.
+  void dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const;
+  /// OpenRPC 1.2.6.
+  Json discover() const;
+  const std::vector<Method>& methods() const { return methods_; }
+
+ private:
+  void add_job_methods(JobBook& book);
+  void add_cell_methods(CellDesk& desk);
+  void add_system_methods(std::function<Json()> info);
+
+  AuditLog& audit_;
+  std::vector<Method> methods_;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,162 @@
+#include "daemon/server/model_copy.h"
+
+#include <fcntl.h>
+#include <grp.h>
+#include <pwd.h>
+#include <sys/fsuid.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+
+#include "planner/sha256.h"
+#include "sampling/check.h"
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A file that closes itself.
+class OpenFile {
+ public:
+  explicit OpenFile(int fd) : fd_(fd) {}
+  ~OpenFile() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+/// The system call itself: glibc's setgroups changes every thread of the process, the kernel's only this one.
+void set_thread_groups(const std::vector<gid_t>& groups) {
+  CHECK(::syscall(SYS_setgroups, groups.size(), groups.data()) == 0);
+}
+
+std::vector<gid_t> groups_of(uid_t uid, gid_t gid) {
+  std::vector<gid_t> groups(64);
+  int count = static_cast<int>(groups.size());
+  const passwd* user = ::getpwuid(uid);
+  if (user == nullptr || ::getgrouplist(user->pw_name, gid, groups.data(), &count) < 0) return {gid};
+  groups.resize(static_cast<std::size_t>(count));
+  return groups;
+}
+
+/// O_NONBLOCK: opening a pipe must not wait for its writer.
+int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
+  int fd = -1, error = 0;
+  {
+    const AsPeer peer(uid, gid);
+    fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    error = errno;
+  }
+  if (fd < 0) throw InputError(file.string(), std::string("can't be read: ") + std::strerror(error));
+  struct stat status {};
+  if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
+    ::close(fd);
+    throw InputError(file.string(), "is no regular file");
+  }
+  return fd;
+}
+
+void write_all(int fd, const char* bytes, std::size_t count, const fs::path& file) {
+  while (count > 0) {
+    const ssize_t written = ::write(fd, bytes, count);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0)
+      throw InputError(file.string(), std::string("the job's copy can't be written: ") + std::strerror(errno));
+    bytes += written;
+    count -= static_cast<std::size_t>(written);
+  }
+}
+
+/// Relative to `base`, by name only: links were already followed or not when the list was made.
+fs::path place_below(const fs::path& file, const fs::path& base) {
+  const fs::path relative = fs::absolute(file).lexically_normal().lexically_relative(base);
+  if (relative.empty() || *relative.begin() == "..")
+    throw InputError(file.string(), "lies outside the model's folder; a job takes only what is below it");
+  return relative;
+}
+
+std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintmax_t bytes_left,
+                         const fs::path& source) {
+  fs::create_directories(to.parent_path());
+  const OpenFile out(::open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
+  if (out.get() < 0)
+    throw InputError(source.string(), std::string("the job's copy can't be made: ") + std::strerror(errno));
+  std::vector<char> block(std::size_t{1} << 18);
+  std::uintmax_t copied = 0;
+  for (;;) {
+    const ssize_t count = ::read(from, block.data(), block.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw InputError(source.string(), std::string("can't be read: ") + std::strerror(errno));
+    if (count == 0) return copied;
+    copied += static_cast<std::uintmax_t>(count);
+    if (copied > bytes_left)
+      throw InputError(source.string(), "makes the model larger than " + std::to_string(kModelBytesMax >> 20) + " MB");
+    hash.update(std::string_view(block.data(), static_cast<std::size_t>(count)));
+    write_all(out.get(), block.data(), static_cast<std::size_t>(count), source);
+  }
+}
+
+}  // namespace
+
+AsPeer::AsPeer(uid_t uid, gid_t gid) {
+  if (::geteuid() != 0 || uid == 0) return;
+  own_groups_.resize(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
+  CHECK(::getgroups(static_cast<int>(own_groups_.size()), own_groups_.data()) >= 0);
+  is_changed_ = true;
+  set_thread_groups(groups_of(uid, gid));
+  ::setfsgid(gid);
+  ::setfsuid(uid);
+}
+
+AsPeer::~AsPeer() {
+  if (!is_changed_) return;
+  ::setfsuid(::geteuid());
+  ::setfsgid(::getegid());
+  set_thread_groups(own_groups_);
+}
+
+void check_readable(const fs::path& file, uid_t uid, gid_t gid) {
+  const OpenFile open(open_as_peer(file, uid, gid));
+}
+
+ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, const fs::path& target, uid_t uid,
+                     gid_t gid) {
+  if (files.size() > kModelFilesMax)
+    throw InputError(model.string(), "refers to more than " + std::to_string(kModelFilesMax) + " files");
+  const fs::path base = fs::absolute(model).lexically_normal().parent_path();
+  std::error_code ignored;
+  fs::remove_all(target, ignored);
+  try {
+    Sha256 hash;
+    std::uintmax_t bytes = 0;
+    bool has_model = false;
+    for (const auto& file : files) {
+      const fs::path relative = place_below(file, base);
+      has_model = has_model || relative == model.filename();
+      const OpenFile from(open_as_peer(file, uid, gid));
+      bytes += copy_file(from.get(), target / relative, hash, kModelBytesMax - bytes, file);
+    }
+    if (!has_model) throw InputError(model.string(), "is not among the files that reading it reads");
+    return {target / model.filename(), hash.hex_digest()};
+  } catch (const fs::filesystem_error& error) {
+    fs::remove_all(target, ignored);
+    throw InputError(model.string(), std::string("can't be copied: ") + error.what());
+  } catch (...) {
+    fs::remove_all(target, ignored);
+    throw;
+  }
+}
+
+}  // namespace hilbrush

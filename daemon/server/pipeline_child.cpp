@@ -1,0 +1,360 @@
+#include "daemon/server/pipeline_child.h"
+
+#include <fcntl.h>
+#include <grp.h>
+#include <poll.h>
+#include <pwd.h>
+#include <sys/eventfd.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "sampling/check.h"
+
+namespace hilbrush {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Steady = std::chrono::steady_clock;
+
+constexpr std::size_t kKeptStderr = 2000;
+constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+constexpr int kPollMs = 100;
+
+struct Pipe {
+  int read_end = -1, write_end = -1;
+};
+
+Pipe make_pipe() {
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0)
+    throw std::runtime_error(std::string("no pipe can be made: ") + std::strerror(errno));
+  return {ends[0], ends[1]};
+}
+
+/// The groups of a user, looked up before the fork, where it is still allowed to.
+std::vector<gid_t> groups_of(const ChildOwner& owner) {
+  std::vector<gid_t> groups(64);
+  int count = static_cast<int>(groups.size());
+  const passwd* user = ::getpwuid(owner.uid);
+  if (user == nullptr || ::getgrouplist(user->pw_name, owner.gid, groups.data(), &count) < 0) return {owner.gid};
+  groups.resize(static_cast<std::size_t>(count));
+  return groups;
+}
+
+/// Everything that the new process needs, prepared by the old one: after fork only async-signal-safe calls are made.
+struct Launch {
+  std::vector<char*> argv;
+  int null_fd, out_fd, err_fd;
+  pid_t parent;
+  std::optional<ChildOwner> owner;
+  std::vector<gid_t> groups;
+};
+
+[[noreturn]] void become_pipeline(const Launch& launch) {
+  ::setpgid(0, 0);
+  if (launch.owner && (::setgroups(launch.groups.size(), launch.groups.data()) != 0 ||
+                       ::setgid(launch.owner->gid) != 0 || ::setuid(launch.owner->uid) != 0))
+    ::_exit(126);
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // after setuid, which clears it
+  if (::getppid() != launch.parent) ::_exit(126);
+  ::dup2(launch.null_fd, 0);
+  ::dup2(launch.out_fd, 1);
+  ::dup2(launch.err_fd, 2);
+  ::close_range(3, ~0u, 0);
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  [[maybe_unused]] const int lower_priority = ::nice(5);
+  sigset_t none;
+  sigemptyset(&none);
+  ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
+  for (const int signal : {SIGPIPE, SIGTERM, SIGINT, SIGHUP}) ::signal(signal, SIG_DFL);
+  ::execv(launch.argv.front(), launch.argv.data());
+  ::_exit(127);
+}
+
+std::uint64_t resident_bytes(pid_t pid) {
+  std::ifstream in("/proc/" + std::to_string(pid) + "/statm");
+  std::uint64_t total = 0, resident = 0;
+  in >> total >> resident;
+  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+std::string last_line(const std::string& text) {
+  auto end = text.find_last_not_of(" \n\r\t");
+  if (end == std::string::npos) return {};
+  const auto begin = text.rfind('\n', end);
+  return text.substr(begin == std::string::npos ? 0 : begin + 1,
+                     end - (begin == std::string::npos ? 0 : begin + 1) + 1);
+}
+
+std::string figure(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+}  // namespace
+
+struct PipelineChildren::Child {
+  ChildId id = 0;
+  ChildOrder order;
+  pid_t pid = -1;
+  int out_fd = -1, err_fd = -1;
+  std::string line, stderr_text;
+  Steady::time_point last_heard, last_told;
+  std::string stage;
+  double fraction = 0;
+  bool has_news = false;
+  bool is_killed = false, is_cancelled = false;
+  ChildOutcome outcome;
+  bool has_result = false;
+
+  ~Child() {
+    for (const int fd : {out_fd, err_fd})
+      if (fd >= 0) ::close(fd);
+  }
+};
+
+PipelineChildren::PipelineChildren(std::filesystem::path program, ChildLimits limits)
+    : program_(std::move(program)), limits_(limits), wake_fd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  CHECK(wake_fd_ >= 0);
+  thread_ = std::thread([this] { watch(); });
+}
+
+PipelineChildren::~PipelineChildren() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_ending_ = true;
+    tasks_.clear();
+  }
+  ::eventfd_write(wake_fd_, 1);
+  thread_.join();
+  ::close(wake_fd_);
+}
+
+void PipelineChildren::push(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    CHECK_LT(tasks_.size(), kQueueMax);  // the job book starts one thing at a time
+    tasks_.push_back(std::move(task));
+  }
+  ::eventfd_write(wake_fd_, 1);
+}
+
+PipelineChildren::ChildId PipelineChildren::start(ChildOrder order) {
+  const ChildId id = ++last_id_;
+  push([this, id, held = std::make_shared<ChildOrder>(std::move(order))] { spawn(id, std::move(*held)); });
+  return id;
+}
+
+void PipelineChildren::cancel(ChildId id) {
+  push([this, id] {
+    for (auto& child : children_) {
+      if (child->id != id) continue;
+      child->is_cancelled = true;
+      kill_child(*child, "cancelled");
+    }
+  });
+}
+
+void PipelineChildren::run(std::function<void()> errand) {
+  push(std::move(errand));
+}
+
+void PipelineChildren::watch() {
+  for (;;) {
+    std::vector<pollfd> polled{{wake_fd_, POLLIN, 0}};
+    for (const auto& child : children_)
+      for (const int fd : {child->out_fd, child->err_fd})
+        if (fd >= 0) polled.push_back({fd, POLLIN, 0});
+    ::poll(polled.data(), polled.size(), children_.empty() ? -1 : kPollMs);
+    eventfd_t ignored;
+    ::eventfd_read(wake_fd_, &ignored);
+
+    std::deque<std::function<void()>> tasks;
+    {
+      const std::lock_guard lock(mutex_);
+      if (is_ending_) break;
+      tasks.swap(tasks_);
+    }
+    for (const auto& task : tasks) task();
+    for (const auto& child : children_) {
+      read_output(*child);
+      check_limits(*child);
+      report_progress(*child, Steady::now() - child->last_told >= kProgressInterval);
+    }
+    std::erase_if(children_, [this](const auto& child) { return bury(*child); });
+  }
+  for (const auto& child : children_) {
+    ::kill(-child->pid, SIGKILL);
+    ::waitpid(child->pid, nullptr, 0);
+  }
+}
+
+void PipelineChildren::spawn(ChildId id, ChildOrder order) {
+  auto child = std::make_unique<Child>();
+  child->id = id;
+  child->order = std::move(order);
+  child->last_heard = child->last_told = Steady::now();
+  try {
+    const Pipe out = make_pipe();
+    child->out_fd = out.read_end;
+    const Pipe err = make_pipe();
+    child->err_fd = err.read_end;
+    std::string program = program_.string();
+    Launch launch{{program.data()},
+                  ::open("/dev/null", O_RDWR | O_CLOEXEC),
+                  out.write_end,
+                  err.write_end,
+                  ::getpid(),
+                  std::nullopt,
+                  {}};
+    for (auto& argument : child->order.arguments) launch.argv.push_back(argument.data());
+    launch.argv.push_back(nullptr);
+    if (child->order.owner && ::geteuid() == 0 && child->order.owner->uid != 0) {
+      launch.owner = child->order.owner;
+      launch.groups = groups_of(*launch.owner);
+    }
+    child->pid = ::fork();
+    if (child->pid == 0) become_pipeline(launch);
+    for (const int fd : {launch.null_fd, launch.out_fd, launch.err_fd}) ::close(fd);
+    if (child->pid < 0) throw std::runtime_error(std::string("no process can be started: ") + std::strerror(errno));
+    ::setpgid(child->pid, child->pid);  // the child does it too: whoever comes first
+    for (const int fd : {child->out_fd, child->err_fd}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
+  } catch (const std::exception& error) {
+    child->outcome.error = error.what();
+    child->order.on_end(std::move(child->outcome));
+    return;
+  }
+  children_.push_back(std::move(child));
+}
+
+void PipelineChildren::read_output(Child& child) {
+  const auto drain = [](int& fd, auto take) {
+    char buffer[65536];
+    // A child that never stops talking must not keep the others waiting.
+    for (int round = 0; fd >= 0 && round < 16; ++round) {
+      const ssize_t count = ::read(fd, buffer, sizeof buffer);
+      if (count > 0) {
+        take(buffer, static_cast<std::size_t>(count));
+      } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
+        ::close(fd);
+        fd = -1;
+      } else {
+        return;
+      }
+    }
+  };
+  drain(child.out_fd, [&](const char* text, std::size_t length) {
+    for (const char* end = text + length; text < end;) {
+      const char* newline = std::find(text, end, '\n');
+      child.line.append(text, newline);
+      if (child.line.size() > limits_.line_bytes) {
+        kill_child(child, "the pipeline wrote a line of more than " + std::to_string(limits_.line_bytes) +
+                              " bytes and was killed");
+        child.line.clear();
+      }
+      if (newline == end) break;
+      take_line(child, child.line);
+      child.line.clear();
+      text = newline + 1;
+    }
+  });
+  drain(child.err_fd, [&](const char* text, std::size_t length) {
+    child.stderr_text.append(text, length);
+    if (child.stderr_text.size() > kKeptStderr) child.stderr_text.erase(0, child.stderr_text.size() - kKeptStderr);
+  });
+}
+
+void PipelineChildren::take_line(Child& child, const std::string& line) {
+  if (child.is_killed) return;
+  try {
+    const Json json = Json::parse(line);
+    child.last_heard = Steady::now();
+    if (json.contains("stage")) {
+      const auto stage = json.at("stage").get<std::string>();
+      const bool is_new = stage != child.stage;
+      child.stage = stage.substr(0, 50);
+      child.fraction = std::clamp(json.value("fraction", 0.), 0., 1.);
+      child.has_news = true;
+      report_progress(child, is_new);
+    } else if (json.contains("warning")) {
+      if (child.order.on_warning) child.order.on_warning(json.at("warning").get<std::string>());
+    } else if (json.contains("result")) {
+      child.has_result = true;
+      child.outcome.result = json.at("result").dump(-1, ' ', false, Json::error_handler_t::replace);
+    } else if (json.contains("error")) {
+      child.outcome.error_at = json.at("error").value("at", "");
+      child.outcome.error = json.at("error").at("message").get<std::string>();
+    }
+  } catch (const Json::exception&) {
+    kill_child(child, "the pipeline wrote a line that is none of its protocol and was killed");
+  }
+}
+
+void PipelineChildren::report_progress(Child& child, bool is_due) {
+  if (!is_due || !child.has_news) return;
+  child.has_news = false;
+  child.last_told = Steady::now();
+  if (child.order.on_progress) child.order.on_progress(child.stage, child.fraction);
+}
+
+void PipelineChildren::check_limits(Child& child) {
+  if (child.is_killed) return;
+  const std::chrono::duration<double> silence = Steady::now() - child.last_heard;
+  if (silence.count() > limits_.silence_s)
+    kill_child(child, "the pipeline made no progress for " + figure(limits_.silence_s) + " s and was killed");
+  else if (resident_bytes(child.pid) > limits_.resident_bytes)
+    kill_child(child, "the pipeline needed more than " + figure(static_cast<double>(limits_.resident_bytes >> 20)) +
+                          " MB of memory and was killed; a smaller model or fewer dots may help");
+}
+
+void PipelineChildren::kill_child(Child& child, std::string sentence) {
+  if (child.is_killed) return;
+  child.is_killed = true;
+  child.outcome.error_at.clear();
+  child.outcome.error = std::move(sentence);
+  ::kill(-child.pid, SIGKILL);
+}
+
+/// True once the child is gone and its end is told.
+bool PipelineChildren::bury(Child& child) {
+  siginfo_t info{};
+  if (::waitid(P_PID, static_cast<id_t>(child.pid), &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
+    return false;
+  ::kill(-child.pid, SIGKILL);  // whatever it started itself; before its id can belong to another
+  int status = 0;
+  ::waitpid(child.pid, &status, 0);
+  read_output(child);
+  report_progress(child, true);
+  if (child.is_cancelled) return true;
+
+  ChildOutcome& outcome = child.outcome;
+  if (!child.is_killed) {
+    const bool is_clean = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    outcome.is_ok = is_clean && child.has_result;
+    const std::string said = last_line(child.stderr_text);
+    const std::string tail = said.empty() ? "" : "; its last words: " + said;
+    if (WIFSIGNALED(status))
+      outcome.error = std::string("the pipeline crashed: ") + ::strsignal(WTERMSIG(status)) + tail;
+    else if (WEXITSTATUS(status) == 127 && said.empty() && outcome.error.empty())
+      outcome.error = program_.string() + " can't be started";
+    else if (!outcome.is_ok && outcome.error.empty())
+      outcome.error =
+          "the pipeline ended with exit code " + std::to_string(WEXITSTATUS(status)) + " and without a result" + tail;
+  }
+  child.order.on_end(std::move(outcome));
+  return true;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,51 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "daemon/server/job.h"
+#include "daemon/server/method_table.h"
+
+/// The Unix socket: JSON-RPC 2.0, one message a line. One thread; requests never wait behind work. Nobody disturbs
+/// anybody: a line is bounded, a client that does not read is not read from either, and its notifications are held as
+/// "there is news" instead of as text.
+namespace hilbrush {
+
+struct ServerLimits {
+  std::size_t line_bytes = std::size_t{1} << 20;    ///< longer: refused, and the connection closed
+  std::size_t unread_bytes = std::size_t{1} << 18;  ///< of answers a client has not read, before its requests wait
+  std::size_t pending_replies = 64;                 ///< of one client
+  std::size_t clients = 1000;
+};
+
+class Server {
+ public:
+  explicit Server(const ServerLimits& limits = {});
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  /// Runs `task` on the socket thread. Any thread; tasks posted after the end of run() are dropped.
+  void post(std::function<void()> task);
+  /// Mode 0660. The caller has made sure that no other daemon uses the path; what is left of a dead one is removed.
+  /// @throws std::runtime_error with a sentence.
+  void listen(const std::filesystem::path& socket, const MethodTable& methods, const JobBook& book);
+  /// A job has changed: whoever watches it is told. Socket thread.
+  void notify(const Job& job);
+  std::size_t client_count() const;
+
+  /// Calls `task` once on SIGTERM or SIGINT, on the socket thread.
+  void on_termination(std::function<void()> task);
+  /// Calls `task` on the socket thread again and again until it says true.
+  void poll(double period_s, std::function<bool()> task);
+  /// Serves until end_run().
+  void run();
+  /// Any thread.
+  void end_run();
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace hilbrush
