@@ -1,0 +1,281 @@
+#include "sim/film/fidelity.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include "sim/film/masked_image.h"
+#include "sim/film/orthographic_view.h"
+
+namespace hilbrush {
+
+namespace {
+
+constexpr std::size_t kSampleCount = 20'000;
+constexpr double kIdenticalDb = 99;  ///< stands for "no difference at all"
+
+/// A surface point of the measurement, and what the film shows around it.
+struct Reading {
+  SurfacePoint point;
+  bool is_reachable = false;
+  std::array<double, 2> wanted{}, painted{};  ///< Gaussian means of sigma 1 and 2 pitches
+};
+
+/// SplitMix64 (Steele et al. 2014) as a hash: independent numbers for each (seed, index), whatever thread asks.
+double uniform(std::uint64_t seed, std::uint64_t index) {
+  std::uint64_t z = seed * 0x9E3779B97F4A7C15u + (index + 1) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+/// One point in each of kSampleCount strata of equal area, which follow the order of the triangles.
+std::vector<Reading> stratified_points(const TexturedMesh& mesh, std::uint64_t seed) {
+  std::vector<double> area_to(mesh.triangle_count());
+  double area = 0;
+  for (std::size_t t = 0; t < area_to.size(); ++t) area_to[t] = area += mesh.area_vector(t).norm();
+  std::vector<Reading> readings(area > 0 ? kSampleCount : 0);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const double place = (i + uniform(seed, 3 * i)) / kSampleCount * area;
+    const auto t = std::min<std::size_t>(std::upper_bound(area_to.begin(), area_to.end(), place) - area_to.begin(),
+                                         area_to.size() - 1);
+    const double root = std::sqrt(uniform(seed, 3 * i + 1)), v = uniform(seed, 3 * i + 2);
+    readings[i].point = {static_cast<std::uint32_t>(t), {1 - root, root * (1 - v), root * v}};
+  }
+  return readings;
+}
+
+/// Area-weighted Gaussian means of wanted and painted coverage around the reading's point.
+void read_film(const Film& film, const ToneField& tone, Reading& reading, std::vector<FilmPoint>& points) {
+  const Eigen::Vector3d center_O = position(film.mesh(), reading.point),
+                        normal_O = face_normal(film.mesh(), reading.point);
+  film.points_near(reading.point, 6 * film.pitch_m(), points);
+  std::array<double, 2> weight{};
+  for (const FilmPoint& point : points) {
+    const Eigen::Vector3d offset = (point.position_O - center_O) / film.pitch_m();
+    const double depth = offset.dot(normal_O), r2 = offset.squaredNorm() - depth * depth;
+    const double wanted = tone.wanted(point.point), painted = film.painted(point.dose_j_m2);
+    for (int k = 0; k < 2; ++k) {
+      const double sigma = k + 1;
+      if (r2 > 9 * sigma * sigma || std::abs(depth) > 3 * sigma) continue;
+      const double w = point.area_m2 * std::exp(-r2 / (2 * sigma * sigma));
+      weight[k] += w, reading.wanted[k] += w * wanted, reading.painted[k] += w * painted;
+    }
+  }
+  for (int k = 0; k < 2; ++k) {
+    // A piece of surface too small to own a node within reach: the point itself.
+    if (!(weight[k] > 0))
+      reading.wanted[k] = tone.wanted(reading.point), reading.painted[k] = film.painted(reading.point), weight[k] = 1;
+    reading.wanted[k] /= weight[k], reading.painted[k] /= weight[k];
+  }
+}
+
+double decibels(double mean_square) {
+  return mean_square > 0 ? std::min(kIdenticalDb, -10 * std::log10(mean_square)) : kIdenticalDb;
+}
+
+/// Everything but S2, over the readings that `counts` accepts.
+template <class Counts>
+FidelityFigures surface_figures(const std::vector<Reading>& readings, Counts counts) {
+  std::array<double, 2> square{};
+  std::array<double, 10> tenth_error{}, tenth_count{};
+  std::vector<double> errors;
+  for (const Reading& reading : readings) {
+    if (!counts(reading)) continue;
+    for (int k = 0; k < 2; ++k) square[k] += std::pow(reading.painted[k] - reading.wanted[k], 2);
+    const double error = reading.painted[1] - reading.wanted[1];
+    errors.push_back(std::abs(error));
+    const int tenth = std::clamp(static_cast<int>(reading.wanted[1] * 10), 0, 9);
+    tenth_error[tenth] += error, tenth_count[tenth] += 1;
+  }
+  FidelityFigures figures;
+  if (errors.empty()) return figures;
+  const auto count = static_cast<double>(errors.size());
+  figures.f1_db = decibels(square[0] / count), figures.f2_db = decibels(square[1] / count);
+  // A tenth of which there is almost nothing has no mean tone to speak of.
+  constexpr double kShareMin = .002;
+  for (int i = 0; i < 10; ++i) {
+    if (tenth_count[i] < kShareMin * count) continue;
+    const double error = tenth_error[i] / tenth_count[i];
+    figures.tone_rms += error * error * tenth_count[i] / count;
+    figures.tone_max = std::max(figures.tone_max, std::abs(error));
+  }
+  figures.tone_rms = std::sqrt(figures.tone_rms);
+  const auto rank = static_cast<std::size_t>(.999 * (count - 1));
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(rank), errors.end());
+  figures.p999 = errors[rank];
+  return figures;
+}
+
+/// Reachability everywhere, from the readings: that of the nearest one of a similar normal.
+class ReachMap {
+ public:
+  ReachMap(const TexturedMesh& mesh, const std::vector<Reading>& readings) : mesh_(mesh), readings_(readings) {
+    cell_m_ = 2 * std::sqrt(mesh.area_m2() / static_cast<double>(std::max<std::size_t>(readings.size(), 1)));
+    for (std::uint32_t i = 0; i < readings.size(); ++i)
+      cells_[key(cell_of(position(mesh, readings[i].point)))].push_back(i);
+  }
+
+  bool is_reachable(const SurfacePoint& point) const {
+    const Eigen::Vector3d p_O = position(mesh_, point), normal_O = face_normal(mesh_, point);
+    const Eigen::Vector3i middle = cell_of(p_O);
+    double nearest = std::numeric_limits<double>::infinity();
+    bool reachable = true;
+    for (int k = 0; k < 27; ++k) {
+      const auto found = cells_.find(key(middle + Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
+      if (found == cells_.end()) continue;
+      for (const std::uint32_t i : found->second) {
+        const double distance = (position(mesh_, readings_[i].point) - p_O).squaredNorm();
+        if (distance < nearest && face_normal(mesh_, readings_[i].point).dot(normal_O) > .5)
+          nearest = distance, reachable = readings_[i].is_reachable;
+      }
+    }
+    return reachable;
+  }
+
+ private:
+  Eigen::Vector3i cell_of(const Eigen::Vector3d& p_O) const { return (p_O / cell_m_).array().floor().cast<int>(); }
+  static std::uint64_t key(const Eigen::Vector3i& cell) {
+    std::uint64_t key = 0;
+    for (int k = 0; k < 3; ++k) key = key << 21 | (static_cast<std::uint32_t>(cell[k]) & 0x1fffffu);
+    return key;
+  }
+
+  const TexturedMesh& mesh_;
+  const std::vector<Reading>& readings_;
+  double cell_m_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+};
+
+/// The six directions of S2: along the axes, turned so that nothing drawn parallel to them falls in line with the
+/// pixels.
+std::array<ViewDirection, 6> measuring_views() {
+  const Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(.35, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(.21, Eigen::Vector3d::UnitX())).matrix();
+  std::array<ViewDirection, 6> views;
+  for (int k = 0; k < 6; ++k) {
+    const double sign = k % 2 == 0 ? 1 : -1;
+    views[k] = {"", turn * sign * Eigen::Vector3d::Unit(k / 2), turn * Eigen::Vector3d::Unit((k / 2 + 1) % 3)};
+  }
+  return views;
+}
+
+/// Sum of local SSIM (Wang et al. 2004, window sigma 1.5 pixels) and the number of pixels that it is over.
+std::pair<double, double> ssim_sum(const MaskedImage& picture) {
+  constexpr double kC1 = .01 * .01, kC2 = .03 * .03, kWindowSigma = 1.5;
+  MaskedImage products(picture.width, picture.height, 5);
+  products.weights = picture.weights;
+  for (std::size_t i = 0; i < picture.weights.size(); ++i) {
+    const float a = picture.channels[0][i], b = picture.channels[1][i];
+    const std::array<float, 5> values{a, b, a * a, b * b, a * b};
+    for (int k = 0; k < 5; ++k) products.channels[k][i] = values[k];
+  }
+  const MaskedImage means = masked_blur(products, kWindowSigma);
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < means.weights.size(); ++i) {
+    if (!(means.weights[i] > 0)) continue;
+    const double a = means.channels[0][i], b = means.channels[1][i];
+    const double variance_a = means.channels[2][i] - a * a, variance_b = means.channels[3][i] - b * b,
+                 covariance = means.channels[4][i] - a * b;
+    sum += (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (variance_a + variance_b + kC2));
+    count += 1;
+  }
+  return {sum, count};
+}
+
+/// S2 over all film that is seen, or over what `reach` accepts.
+class ViewSimilarity {
+ public:
+  void add(const MaskedImage& picture, double pixels_a_pitch) {
+    const int step = std::max(1, static_cast<int>(std::lround(pixels_a_pitch)));
+    const auto [sum, count] = ssim_sum(masked_blur(picture, 2 * pixels_a_pitch, step));
+    sum_ += sum, count_ += count;
+  }
+  double mean() const { return count_ > 0 ? sum_ / count_ : 0; }
+
+ private:
+  double sum_ = 0, count_ = 0;
+};
+
+/// Fills wanted (channel 0) and painted (channel 1) coverage of what the view shows.
+MaskedImage look(const Film& film, const ToneField& tone, const OrthographicView& view) {
+  MaskedImage picture(view.width(), view.height(), 2);
+  tbb::parallel_for(0, view.height(), [&](int y) {
+    for (int x = 0; x < view.width(); ++x) {
+      if (view.side(x, y) != OrthographicView::Side::kFront) continue;
+      const SurfacePoint point = view.point(x, y);
+      const std::size_t i = picture.index(x, y);
+      picture.weights[i] = 1;
+      picture.channels[0][i] = static_cast<float>(tone.wanted(point));
+      picture.channels[1][i] = static_cast<float>(film.painted(point));
+    }
+  });
+  return picture;
+}
+
+void keep_reachable(MaskedImage& picture, const OrthographicView& view, const ReachMap& reach) {
+  tbb::parallel_for(0, view.height(), [&](int y) {
+    for (int x = 0; x < view.width(); ++x)
+      if (picture.weights[picture.index(x, y)] > 0 && !reach.is_reachable(view.point(x, y)))
+        picture.weights[picture.index(x, y)] = 0;
+  });
+}
+
+/// A third of a pitch; more for objects so large that a view would take more than some 24 million pixels.
+double measuring_pixel_m(const Film& film) {
+  constexpr double kPixelsMax = 24e6;
+  const auto [low, high] = bounds(film.mesh());
+  return std::max(film.pitch_m() / 3, (high - low).norm() / std::sqrt(kPixelsMax));
+}
+
+}  // namespace
+
+Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTest& is_reachable, std::uint64_t seed,
+                          const Progress& progress) {
+  std::vector<Reading> readings = stratified_points(film.mesh(), seed);
+  constexpr std::size_t kBatch = 2000;
+  for (std::size_t begin = 0; begin < readings.size(); begin += kBatch) {
+    const std::size_t end = std::min(begin + kBatch, readings.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        std::vector<FilmPoint> points;
+                        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                          read_film(film, tone, readings[i], points);
+                          readings[i].is_reachable = !is_reachable || is_reachable(readings[i].point);
+                        }
+                      });
+    if (progress) progress(.5 * static_cast<double>(end) / static_cast<double>(readings.size()));
+  }
+
+  Fidelity fidelity;
+  fidelity.whole = surface_figures(readings, [](const Reading&) { return true; });
+  fidelity.reachable = surface_figures(readings, [](const Reading& reading) { return reading.is_reachable; });
+  const auto unreachable =
+      std::count_if(readings.begin(), readings.end(), [](const Reading& reading) { return !reading.is_reachable; });
+  fidelity.unreachable_share =
+      readings.empty() ? 0 : static_cast<double>(unreachable) / static_cast<double>(readings.size());
+
+  const ReachMap reach(film.mesh(), readings);
+  const double pixel_m = measuring_pixel_m(film);
+  ViewSimilarity whole, reachable;
+  int seen = 0;
+  for (const ViewDirection& direction : measuring_views()) {
+    const OrthographicView view(film.mesh(), direction, pixel_m);
+    MaskedImage picture = look(film, tone, view);
+    whole.add(picture, film.pitch_m() / pixel_m);
+    if (unreachable > 0) {
+      keep_reachable(picture, view, reach);
+      reachable.add(picture, film.pitch_m() / pixel_m);
+    }
+    if (progress) progress(.5 + .5 * ++seen / 6);
+  }
+  fidelity.whole.s2 = whole.mean();
+  fidelity.reachable.s2 = unreachable > 0 ? reachable.mean() : whole.mean();
+  return fidelity;
+}
+
+}  // namespace hilbrush
