@@ -16,6 +16,7 @@ namespace hilbrush {
 struct ModelLimits {
   std::size_t file_bytes = 256u << 20;      ///< each file, after gunzip
   std::size_t nodes = 2'000'000;            ///< VRML nodes, after USE and PROTO are expanded
+  std::size_t values = 32'000'000;          ///< numbers in the nodes' fields (a field and a string count as several)
   int depth = 64;                           ///< nesting of nodes, PROTOs and Inlines
   std::size_t triangles = 4'000'000;
   std::size_t image_pixels = 64u << 20;     ///< all images of the model together
