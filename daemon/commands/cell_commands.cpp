@@ -17,7 +17,7 @@ int ask_daemon(const CommandContext& context, const std::string& method) {
   const Json result = client.call(method, Json());
   if (context.is_json)
     context.terminal.out << result.dump() << std::endl;
-  else if (const Json& cell = member(result, "cell"); cell.is_object())
+  else if (const Json& cell = member(result, "cell"); cell.is_object() && method.starts_with("cell."))
     context.terminal.out << format_cell(cell) << std::flush;
   else
     context.terminal.out << format_fields(result) << std::flush;

@@ -21,7 +21,7 @@ constexpr int kLabelWidth = 15;
 /// "  label:      value\n".
 std::string line(const std::string& label, const std::string& value) {
   std::ostringstream out;
-  out << "  " << std::left << std::setw(kLabelWidth) << label + ":" << printable(value) << '\n';
+  out << "  " << std::left << std::setw(kLabelWidth) << printable(label) + ":" << printable(value) << '\n';
   return out.str();
 }
 
@@ -178,7 +178,7 @@ std::string format_report(const Json& report) {
   const Json& mesh = member(report, "mesh");
   if (mesh.is_object()) {
     text += line("model", text_field(mesh, "file"));
-    text += line("mesh", mesh_text(mesh));
+    if (has_number(mesh, "faces")) text += line("mesh", mesh_text(mesh));
     if (const std::string repairs = repairs_text(member(mesh, "repairs")); !repairs.empty())
       text += line("repaired", repairs);
   }

@@ -26,7 +26,8 @@ bool is_reached(const std::string& state, const std::string& until) {
     if (s == "planning") return 1;
     if (s == "ready") return 2;
     if (s == "painting" || s == "paused") return 3;
-    return s == "done" || s == "failed" || s == "cancelled" ? 4 : -1;
+    if (s == "done") return 4;
+    return s == "failed" || s == "cancelled" ? 5 : -1;  // the end, whatever was waited for
   };
   return state == until || rank(state) > rank(until);
 }

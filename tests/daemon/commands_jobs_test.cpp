@@ -1,0 +1,215 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "daemon/commands/exit_code.h"
+#include "tests/daemon/commands_support.h"
+
+/// Job and cell commands against a daemon that follows a script.
+namespace hilbrush {
+namespace {
+
+using commands_test::AnsweringDaemon;
+using commands_test::CommandRun;
+using commands_test::FakeDaemon;
+using commands_test::Peer;
+using commands_test::run_command;
+using commands_test::TemporaryFolder;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kJob =
+    R"("result":{"job":{"id":"7","state":"painting","model":"/m.wrl","dry_run":false,"dots":{"placed":2000,"exposed":500,"skipped":0},"progress":0.25,"eta_s":65,"error":null}})";
+
+CommandRun run_with(AnsweringDaemon& daemon, std::vector<std::string> arguments, const char* input = nullptr) {
+  arguments.insert(arguments.end(), {"--socket", daemon.socket_path()});
+  return run_command(arguments, false, input);
+}
+
+TEST(JobCommands, EachSendsItsMethodAndParameters) {
+  struct Case {
+    std::vector<std::string> arguments;
+    const char* request;
+  };
+  const Case cases[] = {
+      {{"get", "7"}, R"(job.get {"id":"7"})"},
+      {{"start", "7", "--part-in-place"}, R"(job.start {"id":"7","part_in_place":true})"},
+      {{"pause", "7"}, R"(job.pause {"id":"7"})"},
+      {{"resume", "7"}, R"(job.resume {"id":"7"})"},
+      {{"resume", "7", "--in-doubt", "expose"}, R"(job.resume {"id":"7","in_doubt":"expose"})"},
+      {{"cancel", "7"}, R"(job.cancel {"id":"7"})"},
+      {{"list"}, "job.list -"},
+      {{"status"}, "cell.status -"},
+      {{"stop"}, "cell.stop -"},
+      {{"clear"}, "cell.clear -"},
+      {{"arm"}, "cell.arm -"},
+      {{"home"}, "cell.home -"},
+      {{"info"}, "system.info -"},
+  };
+  for (const Case& c : cases) {
+    AnsweringDaemon daemon(kJob);
+    const CommandRun run = run_with(daemon, c.arguments);
+    EXPECT_EQ(run.exit_code, kExitOk) << run.err;
+    EXPECT_EQ(daemon.requests(), std::vector<std::string>{c.request});
+  }
+}
+
+TEST(JobCommands, JsonIsTheDaemonsResult) {
+  for (const char* command : {"list", "status", "info"}) {
+    AnsweringDaemon daemon(R"("result":{"z":[1],"a":{"b":null}})");
+    EXPECT_EQ(run_with(daemon, {command, "--json"}).out, "{\"z\":[1],\"a\":{\"b\":null}}\n");
+  }
+  AnsweringDaemon daemon(kJob);
+  EXPECT_EQ("\"result\":" + run_with(daemon, {"get", "7", "--json"}).out, std::string(kJob) + "\n");
+}
+
+TEST(JobCommands, SubmitResolvesPathsAndSendsOnlyWhatWasGiven) {
+  const TemporaryFolder folder;
+  folder.write("cup.wrl", "#VRML V2.0 utf8");
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  AnsweringDaemon daemon(kJob);
+  const CommandRun run = run_with(
+      daemon, {"submit", "cup.wrl", "--dry-run", "--key", "order-17", "--size-mm", "80", "--cell", "./c.json"});
+  std::filesystem::current_path(before);
+  EXPECT_EQ(run.exit_code, kExitOk) << run.err;
+  const std::string absolute = std::filesystem::canonical(folder.path()).string();
+  EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.submit {"model":")" + absolute +
+                                                        R"(/cup.wrl","settings":{"size_mm":80.0,"cell":")" + absolute +
+                                                        R"(/c.json"},"dry_run":true,"key":"order-17"})"});
+  EXPECT_EQ(run.out, "job 7: painting, 500 of 2,000 dots exposed, 25 %, about 0:01:05 left\n");
+}
+
+TEST(JobCommands, SubmitRefusesBadInputWithoutTheDaemon) {
+  EXPECT_EQ(run_command({"submit", "/none.wrl"}).exit_code, kExitBadInput);
+  EXPECT_EQ(run_command({"submit", "/dev/null", "--dpi", "1"}).exit_code, kExitBadInput);
+}
+
+TEST(JobCommands, StartAsksOnATerminalAndRefusesInAPipe) {
+  {
+    AnsweringDaemon daemon(kJob);
+    const CommandRun run = run_with(daemon, {"start", "7"});
+    EXPECT_EQ(run.exit_code, kExitRefused);
+    EXPECT_EQ(run.err, "hilbrush: not started: say --part-in-place once the part is on the table\n");
+    EXPECT_TRUE(daemon.requests().empty());
+  }
+  for (const char* no : {"n\n", "\n", "", "yeah\n"}) {
+    AnsweringDaemon daemon(kJob);
+    EXPECT_EQ(run_with(daemon, {"start", "7"}, no).exit_code, kExitRefused) << no;
+    EXPECT_TRUE(daemon.requests().empty());
+  }
+  AnsweringDaemon daemon(kJob);
+  const CommandRun run = run_with(daemon, {"start", "7"}, "y\n");
+  EXPECT_EQ(run.exit_code, kExitOk);
+  EXPECT_EQ(run.err, "Is the part of job 7 in place? [y/N] ");
+  EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.start {"id":"7","part_in_place":true})"});
+}
+
+TEST(JobCommands, RefusalsBecomeExitCodes) {
+  const std::pair<int, int> codes[] = {{-32700, kExitInternal}, {-32600, kExitInternal}, {-32601, kExitInternal},
+                                       {-32602, kExitBadInput}, {-32000, kExitInternal}, {-32001, kExitBadInput},
+                                       {-32002, kExitRefused},  {-32003, kExitBadInput}, {-32004, kExitRefused},
+                                       {-32005, kExitRefused}};
+  for (const auto& [code, exit_code] : codes) {
+    AnsweringDaemon daemon(R"("error":{"code":)" + std::to_string(code) +
+                           R"(,"message":"a sentence","data":{"at":"$.id"}})");
+    const CommandRun run = run_with(daemon, {"pause", "7"});
+    EXPECT_EQ(run.exit_code, exit_code) << code;
+    EXPECT_EQ(run.err, "hilbrush: $.id: a sentence\n");
+  }
+}
+
+TEST(CellCommands, StatusIsText) {
+  AnsweringDaemon daemon(
+      R"("result":{"cell":{"state":"stopped","laser":"off","devices":{"robot":"ready"},"joints":null,"job":null,"fault":null}})");
+  EXPECT_EQ(run_with(daemon, {"status"}).out,
+            "  cell:          stopped\n  laser:         off\n  robot:         ready\n");
+  AnsweringDaemon info(R"("result":{"version":"0.1.0","cell":{"name":"default"}})");
+  EXPECT_EQ(run_with(info, {"info"}).out, "version: 0.1.0\ncell.name: default\n");
+}
+
+std::string job(const std::string& state, double progress, const std::string& more = {}) {
+  return R"({"id":"7","state":")" + state + R"(","dots":{"placed":100,"exposed":)" +
+         std::to_string(static_cast<int>(100 * progress)) + R"(},"progress":)" + std::to_string(progress) + more + "}";
+}
+
+/// A daemon that answers job.watch with the first of these jobs and notifies of the others, then closes or waits.
+std::function<void(Peer&)> telling(std::vector<std::string> jobs, bool closes = false) {
+  return [jobs = std::move(jobs), closes](Peer& peer) {
+    peer.read_line();
+    peer.write_line(R"({"jsonrpc":"2.0","id":1,"result":{"seq":1,"job":)" + jobs[0] + "}}");
+    for (std::size_t i = 1; i < jobs.size(); ++i)
+      peer.write_line(R"({"jsonrpc":"2.0","method":"job.update","params":{"seq":)" + std::to_string(i + 1) +
+                      R"(,"job":)" + jobs[i] + "}}");
+    if (!closes) peer.wait_for_close();
+  };
+}
+
+CommandRun watch(const std::function<void(Peer&)>& script, std::vector<std::string> more = {},
+                 bool is_terminal = false) {
+  FakeDaemon daemon(script);
+  more.insert(more.begin(), {"watch", "7", "--socket", daemon.socket_path()});
+  return run_command(more, is_terminal);
+}
+
+TEST(Watch, APipeGetsLinesUntilTheJobIsDone) {
+  const CommandRun run = watch(
+      telling({job("queued", 0), job("planning", .5, R"(,"stage":"load")"), job("planning", .6, R"(,"stage":"load")"),
+               job("painting", 0), job("painting", .05), job("painting", .11, R"(,"eta_s":9)"), job("painting", .15),
+               job("done", 1, R"(,"output":"/jobs/7")")}));
+  EXPECT_EQ(run.exit_code, kExitOk) << run.err;
+  EXPECT_EQ(run.out,
+            "job 7: queued, 0 of 100 dots exposed\n"
+            "job 7: planning, load 50 %\n"
+            "job 7: painting, 0 of 100 dots exposed, 0 %\n"
+            "job 7: painting, 11 of 100 dots exposed, 11 %, about 0:00:09 left\n"
+            "job 7: done, 100 of 100 dots exposed\n"
+            "results are in /jobs/7\n");
+}
+
+TEST(Watch, ATerminalGetsABar) {
+  const CommandRun run = watch(telling({job("painting", .5), job("done", 1)}), {}, true);
+  EXPECT_TRUE(run.out.starts_with("[############............] job 7: painting, 50 of 100 dots exposed, 50 %\r\033[K"))
+      << run.out;
+  EXPECT_TRUE(run.out.ends_with("\r\033[Kjob 7: done, 100 of 100 dots exposed\n")) << run.out;
+}
+
+TEST(Watch, JsonIsEveryUpdate) {
+  const CommandRun run = watch(telling({job("painting", .5), job("done", 1)}), {"--json"});
+  std::istringstream lines(run.out);
+  std::vector<int> numbers;
+  for (std::string line; std::getline(lines, line);) numbers.push_back(Json::parse(line)["seq"]);
+  EXPECT_EQ(numbers, (std::vector<int>{1, 2}));
+}
+
+TEST(Watch, AFailedOrCancelledJobIsSix) {
+  const CommandRun failed =
+      watch(telling({job("painting", .5), job("failed", .5, R"(,"error":{"at":"laser","message":"interlock open"})")}));
+  EXPECT_EQ(failed.exit_code, kExitJobFailed);
+  EXPECT_EQ(failed.err, "hilbrush: job 7: laser: interlock open\n");
+  EXPECT_EQ(watch(telling({job("cancelled", 0)})).exit_code, kExitJobFailed);
+}
+
+TEST(Watch, UntilEndsAtTheStateOrPastIt) {
+  EXPECT_EQ(watch(telling({job("queued", 0), job("planning", 0), job("ready", 0)}), {"--until", "ready"}).exit_code,
+            kExitOk);
+  EXPECT_EQ(watch(telling({job("painting", 0)}), {"--until", "ready"}).exit_code, kExitOk);
+  EXPECT_EQ(watch(telling({job("painting", 0), job("paused", .5)}), {"--until", "paused"}).exit_code, kExitOk);
+  EXPECT_EQ(watch(telling({job("paused", .5), job("painting", .5)}), {"--until", "painting"}).exit_code, kExitOk);
+  EXPECT_EQ(watch(telling({job("failed", 0)}), {"--until", "ready"}).exit_code, kExitJobFailed);
+}
+
+TEST(Watch, ALostDaemonIsFour) {
+  const CommandRun run = watch(telling({job("painting", .5)}, true));
+  EXPECT_EQ(run.exit_code, kExitNoDaemon);
+  EXPECT_EQ(run.err, "hilbrush: the daemon closed the connection\n");
+}
+
+TEST(Watch, UpdatesOfOtherJobsAreNotMine) {
+  const std::string other = R"({"id":"8","state":"done","progress":1})";
+  EXPECT_EQ(watch(telling({job("painting", .5), other, job("done", 1)})).out,
+            "job 7: painting, 50 of 100 dots exposed, 50 %\njob 7: done, 100 of 100 dots exposed\n");
+}
+
+}  // namespace
+}  // namespace hilbrush

@@ -1,0 +1,117 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "config/cell_file.h"
+#include "daemon/commands/exit_code.h"
+#include "tests/daemon/commands_support.h"
+
+/// Parsing, help, exit codes and check-config: everything of the command that needs neither daemon nor pipeline.
+namespace hilbrush {
+namespace {
+
+using commands_test::CommandRun;
+using commands_test::run_command;
+using commands_test::TemporaryFolder;
+using Json = nlohmann::ordered_json;
+
+const char* const kCommands[] = {"dry-run", "plan",  "develop", "calibrate", "submit",      "watch",  "list",
+                                 "get",     "start", "pause",   "resume",    "cancel",      "status", "stop",
+                                 "clear",   "arm",   "home",    "info",      "check-config"};
+
+TEST(CommandLine, HelpAndVersionAreEverywhere) {
+  const CommandRun help = run_command({"--help"});
+  EXPECT_EQ(help.exit_code, kExitOk);
+  for (const char* command : kCommands) {
+    EXPECT_NE(help.out.find(std::string("\n  ") + command + " "), std::string::npos) << command;
+    const CommandRun own = run_command({command, "--help"});
+    EXPECT_EQ(own.exit_code, kExitOk) << command;
+    EXPECT_NE(own.out.find(std::string("Usage: hilbrush ") + command), std::string::npos) << own.out;
+    EXPECT_NE(own.out.find("--json"), std::string::npos) << command;
+    EXPECT_NE(own.out.find("Exit codes:"), std::string::npos) << command;
+    EXPECT_EQ(own.err, "");
+    const CommandRun version = run_command({command, "--version"});
+    EXPECT_EQ(version.exit_code, kExitOk) << command;
+    EXPECT_EQ(version.out, "hilbrush " HILBRUSH_VERSION "\n");
+  }
+  EXPECT_EQ(run_command({"--version"}).out, "hilbrush " HILBRUSH_VERSION "\n");
+}
+
+TEST(CommandLine, WrongUsageIsTwo) {
+  const std::vector<std::vector<std::string>> wrong{{},
+                                                    {"paint"},
+                                                    {"--nonsense"},
+                                                    {"status", "--nonsense"},
+                                                    {"status", "extra"},
+                                                    {"dry-run"},
+                                                    {"dry-run", "m.obj"},  // no -o
+                                                    {"dry-run", "m.obj", "-o"},
+                                                    {"dry-run", "m.obj", "-o", "d", "--dpi", "many"},
+                                                    {"dry-run", "m.obj", "-o", "d", "--dots", "1.5"},
+                                                    {"develop", "m.obj", "-o", "d", "--program", "p"},
+                                                    {"get"},
+                                                    {"watch", "1", "--until", "tomorrow"},
+                                                    {"resume", "1", "--in-doubt", "maybe"},
+                                                    {"check-config", "a.json", "--cell", "default"}};
+  for (const auto& arguments : wrong) {
+    const CommandRun run = run_command(arguments);
+    EXPECT_EQ(run.exit_code, kExitUsage) << testing::PrintToString(arguments);
+    EXPECT_TRUE(run.err.starts_with("hilbrush: ")) << run.err;
+    EXPECT_EQ(run.out, "");
+  }
+}
+
+TEST(CommandLine, NoDaemonIsFour) {
+  const TemporaryFolder folder;
+  const std::string socket = (folder.path() / "none").string();
+  for (const char* command : {"list", "status", "stop", "clear", "arm", "home", "info"}) {
+    const CommandRun run = run_command({command, "--socket", socket});
+    EXPECT_EQ(run.exit_code, kExitNoDaemon) << command;
+    EXPECT_EQ(run.err, "hilbrush: no daemon answers on " + socket + ": is hilbrushd running?\n");
+    EXPECT_EQ(run.out, "");
+  }
+  const CommandRun as_json = run_command({"stop", "--json", "--socket", socket});
+  EXPECT_EQ(Json::parse(as_json.out)["error"]["code"], kExitNoDaemon);
+}
+
+TEST(CommandLine, TheSocketMayComeFromTheEnvironment) {
+  const TemporaryFolder folder;
+  const std::string socket = (folder.path() / "from-environment").string();
+  setenv("HILBRUSH_SOCKET", socket.c_str(), 1);
+  const CommandRun run = run_command({"status"});
+  unsetenv("HILBRUSH_SOCKET");
+  EXPECT_NE(run.err.find(socket), std::string::npos) << run.err;
+  EXPECT_NE(run_command({"status", "--socket", "/none/flag"}).err.find("/none/flag"), std::string::npos);
+}
+
+TEST(CheckConfig, TheShippedCellIsValid) {
+  const CommandRun run = run_command({"check-config"});
+  EXPECT_EQ(run.exit_code, kExitOk) << run.err;
+  EXPECT_NE(run.out.find("cell \"default\", valid"), std::string::npos) << run.out;
+  const CommandRun as_json = run_command({"check-config", "--json", "--cell", "default"});
+  EXPECT_EQ(Json::parse(as_json.out)["cell"], "default");
+  EXPECT_EQ(Json::parse(as_json.out)["sha256"], load_cell(find_cell("default")).sha256);
+}
+
+TEST(CheckConfig, ABadCellIsThreeAndNamesThePath) {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("cell.json", R"({"name":"mine","axis":{}})");
+  const CommandRun run = run_command({"check-config", file});
+  EXPECT_EQ(run.exit_code, kExitBadInput);
+  EXPECT_EQ(run.err, "hilbrush: " + file + ": $.axes: missing: expected an object, found the key \"axis\" instead\n");
+  EXPECT_EQ(run_command({"check-config", "/none.json"}).exit_code, kExitBadInput);
+  EXPECT_EQ(run_command({"check-config", "--cell", "none"}).exit_code, kExitBadInput);
+}
+
+TEST(CheckConfig, JobSettingsCanBeCheckedToo) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(run_command({"check-config", "--settings", folder.write("job.json", R"({"dpi":300})")}).exit_code, kExitOk);
+  const std::string bad = folder.write("bad.json", R"({"dip":300})");
+  const CommandRun run = run_command({"check-config", "--settings", bad});
+  EXPECT_EQ(run.exit_code, kExitBadInput);
+  EXPECT_TRUE(run.err.starts_with("hilbrush: " + bad + ": $.dip: unknown key")) << run.err;
+}
+
+}  // namespace
+}  // namespace hilbrush

@@ -1,0 +1,84 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/commands/command_line.h"
+
+/// What the tests of the operator's command share: a daemon that follows a script, a folder of their own, and the
+/// command with its streams.
+namespace hilbrush::commands_test {
+
+/// A new folder, removed with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  /// Writes a file and returns its path.
+  std::string write(const std::string& name, const std::string& text, bool is_program = false) const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// One accepted connection, from the daemon's side.
+class Peer {
+ public:
+  explicit Peer(int descriptor) : descriptor_(descriptor) {}
+  std::string read_line();  ///< empty at the end
+  void write(const std::string& text);
+  void write_line(const std::string& text) { write(text + "\n"); }
+  /// Blocks until the other side closes.
+  void wait_for_close();
+
+ private:
+  int descriptor_;
+  std::string buffer_;
+};
+
+/// Listens on a socket and runs the script on the first connection, in a thread of its own.
+class FakeDaemon {
+ public:
+  explicit FakeDaemon(std::function<void(Peer&)> script);
+  ~FakeDaemon();
+  FakeDaemon(const FakeDaemon&) = delete;
+  FakeDaemon& operator=(const FakeDaemon&) = delete;
+  std::string socket_path() const { return (folder_.path() / "socket").string(); }
+  /// Waits until the script has ended.
+  void finish();
+
+ private:
+  TemporaryFolder folder_;
+  int listener_ = -1;
+  std::thread thread_;
+};
+
+/// Answers every request with the same member: "\"result\":{...}".
+class AnsweringDaemon {
+ public:
+  explicit AnsweringDaemon(std::string reply_member);
+  std::string socket_path() const { return daemon_.socket_path(); }
+  /// What was asked, without the constant members. Call after the command ended.
+  std::vector<std::string> requests();
+
+ private:
+  std::vector<std::string> requests_;
+  FakeDaemon daemon_;
+};
+
+struct CommandRun {
+  int exit_code = -1;
+  std::string out, err;
+};
+/// Runs `hilbrush` with these arguments; `input`: what the operator types, on a terminal; nothing: standard input is a
+/// pipe.
+CommandRun run_command(const std::vector<std::string>& arguments, bool is_terminal = false,
+                       const char* input = nullptr);
+
+}  // namespace hilbrush::commands_test
