@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "planner/time_model.h"
 
@@ -21,6 +22,13 @@ double covered(double distance, const AxisDescription& axis, double time_s) {
   if (time_s <= ramp_s) return .5 * a * time_s * time_s;
   if (time_s >= whole_s - ramp_s) return distance - .5 * a * (whole_s - time_s) * (whole_s - time_s);
   return .5 * a * ramp_s * ramp_s + v * (time_s - ramp_s);
+}
+
+/// What is never done close to the object: the elbow going over, J4 or C unwinding.
+bool needs_retract(const Joints& from, const Joints& to) {
+  constexpr double kHalfTurn = std::numbers::pi;
+  return (from[kJ2] >= 0) != (to[kJ2] >= 0) || std::abs(to[kJ4] - from[kJ4]) > kHalfTurn ||
+         std::abs(to[kRotation] - from[kRotation]) > kHalfTurn;
 }
 
 Elbow elbow_of(const Joints& joints) {
@@ -118,7 +126,7 @@ Joints Transit::lifted(Joints joints) const {
 }
 
 std::optional<std::vector<Joints>> Transit::route(const Joints& from, const Joints& to) const {
-  if (elbow_of(from) == elbow_of(to) && is_clear(from, to)) return std::vector<Joints>{};
+  if (!needs_retract(from, to) && is_clear(from, to)) return std::vector<Joints>{};
 
   for (const double back_m : kBackOffsM) {
     const auto out = backed_off(from, back_m), in = backed_off(to, back_m);

@@ -16,9 +16,9 @@ class Transit {
   /// Whether the direct move keeps clear all the way.
   bool is_clear(const Joints& from, const Joints& to) const;
 
-  /// Way-points of the first way found to be clear: none (direct, if the elbow stays); backing off along the beam,
-  /// moving over, coming in along the new beam; the same with the arm lifted; by way of the home pose. Nothing if none
-  /// is.
+  /// Way-points of the first way found to be clear: none (direct, unless the elbow or a winding changes); backing off
+  /// along the beam, moving over, coming in along the new beam; the same with the arm lifted; by way of the home pose.
+  /// Nothing if none is.
   std::optional<std::vector<Joints>> route(const Joints& from, const Joints& to) const;
 
  private:

@@ -1,0 +1,51 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <memory>
+#include <string>
+
+#include "planner/cell_description.h"
+#include "sampling/textured_mesh.h"
+
+/// The cell as the program check sees it: forward kinematics as a chain of transforms, the tool as a bundle of rays,
+/// table parts by inside tests. Written apart from kinematics and clearance, which planning uses, so that it does not
+/// repeat their faults. Thread-safe after construction.
+namespace hilbrush {
+
+class CheckCell {
+ public:
+  CheckCell(const TexturedMesh& mesh, const CellDescription& cell);
+  ~CheckCell();
+
+  /// The tool in O: origin at the flange, x along its yaw, z up.
+  Eigen::Isometry3d X_OF(const Joints& joints) const;
+  Eigen::Vector3d focus_O(const Eigen::Isometry3d& X_OF) const {
+    return X_OF * (cell_.arm.flange_to_focus_m * beam_F_);
+  }
+  Eigen::Vector3d beam_O(const Eigen::Isometry3d& X_OF) const { return X_OF.linear() * beam_F_; }
+
+  /// Why the beam, cast from the lens, does not land within `tolerance_m` of the focus; empty if it does.
+  std::string beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const;
+  /// What lens body or quill run into; empty if nothing.
+  std::string body_fault(const Eigen::Isometry3d& X_OF) const;
+  /// How far the ends of the lens travel in O between two poses.
+  double travel_m(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;
+
+ private:
+  struct Rays;
+  /// A solid cylinder in the frame F: axis from `from_F` along `axis_F`.
+  struct Cylinder {
+    Eigen::Vector3d from_F, axis_F;
+    double length_m, radius_m;
+  };
+  bool touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OF) const;
+  bool touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OF) const;
+  bool is_in_table(const Eigen::Vector3d& p_O) const;
+
+  CellDescription cell_;
+  Eigen::Vector3d beam_F_;
+  Cylinder lens_, quill_;
+  double reach_m_;  ///< radius of object, plate and post around O
+  std::unique_ptr<Rays> rays_;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,287 @@
+#include "planner/program_check.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <numbers>
+
+#include "planner/check_cell.h"
+
+namespace hilbrush {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kFocusToleranceM = 1e-9;
+constexpr double kLandingToleranceM = 10e-6;
+constexpr double kJointTolerance = 1e-9;
+constexpr double kIncidenceTolerance = 1e-5;  // rad: normals and incidences are kept in single precision
+constexpr double kEnergyTolerance = 1e-5;     // relative, for the same reason
+constexpr double kLookM = 3e-3;               // along moves, clearance is looked at this often
+constexpr std::size_t kBlock = 512;
+
+using Faults = std::vector<ProgramFault>;
+
+__attribute__((format(printf, 1, 2))) std::string sentence(const char* format, ...) {
+  char text[256];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+const char* axis_name(int axis) {
+  return kAxisNames[static_cast<std::size_t>(axis)];
+}
+
+/// Where an axis is `time_s` into a move over `distance`: the second half is the first one backwards.
+double axis_position(double distance, double time_s, const AxisDescription& axis) {
+  const double peak = std::min(axis.speed_max, std::sqrt(distance * axis.acceleration_max));
+  const double end_s = peak > 0 ? distance / peak + peak / axis.acceleration_max : 0;
+  if (time_s >= end_s) return distance;
+  if (time_s > end_s / 2) return distance - axis_position(distance, end_s - time_s, axis);
+  const double ramp_s = peak / axis.acceleration_max;
+  const double ramping_s = std::min(time_s, ramp_s);
+  return .5 * axis.acceleration_max * ramping_s * ramping_s + peak * (time_s - ramping_s);
+}
+
+double axis_end_s(double distance, const AxisDescription& axis) {
+  const double peak = std::min(axis.speed_max, std::sqrt(distance * axis.acceleration_max));
+  return peak > 0 ? distance / peak + peak / axis.acceleration_max : 0;
+}
+
+class ProgramCheck {
+ public:
+  ProgramCheck(const ExposureProgram& program, const DotSequence& dots, const TexturedMesh& mesh,
+               const CellDescription& cell, const PlanOptions& options)
+      : program_(program), dots_(dots), cell_(cell), options_(options), check_cell_(mesh, cell) {}
+
+  void check_counts(const std::vector<SkippedDot>& skipped, Faults& faults) const;
+  void check_vias(Faults& faults) const;
+  void check_exposure(std::size_t i, Faults& faults) const;
+  /// The way from exposure i - 1 (or home) to exposure i (or home, if i is the count).
+  void check_way(std::size_t i, Faults& faults) const;
+
+ private:
+  bool is_inside(int axis, double value) const;
+  bool is_inside(const Joints& joints) const;
+  void check_limits(const Joints& joints, std::size_t i, Faults& faults) const;
+  void check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Faults& faults) const;
+  void check_dose(std::size_t i, Faults& faults) const;
+  void check_direct_move(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
+  void check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
+  Joints home() const {
+    Joints joints;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) joints[axis] = cell_.axes[axis].home;
+    return joints;
+  }
+
+  const ExposureProgram& program_;
+  const DotSequence& dots_;
+  const CellDescription& cell_;
+  const PlanOptions& options_;
+  CheckCell check_cell_;
+};
+
+void ProgramCheck::check_counts(const std::vector<SkippedDot>& skipped, Faults& faults) const {
+  std::vector<std::uint8_t> seen(dots_.dots.size(), 0);
+  const auto see = [&](std::uint32_t dot, std::size_t exposure, const char* where) {
+    if (dot >= seen.size())
+      faults.push_back({sentence("dot %u, %s, is none of the %zu dots", dot, where, seen.size()), exposure});
+    else if (seen[dot]++)
+      faults.push_back({sentence("dot %u, %s, occurs more than once", dot, where), exposure});
+  };
+  for (std::size_t i = 0; i < program_.exposures.size(); ++i) see(program_.exposures[i].dot_index, i, "exposed");
+  for (const auto& s : skipped) {
+    see(s.dot_index, program_.exposures.size(), "skipped");
+    if (s.detail.empty())
+      faults.push_back({sentence("dot %u is skipped without a reason", s.dot_index), program_.exposures.size()});
+  }
+  const auto missing = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), 0));
+  if (missing > 0)
+    faults.push_back({sentence("%zu dots are neither exposed nor skipped", missing), program_.exposures.size()});
+  if (!(program_.pitch_m > 0) || std::abs(program_.pitch_m - dots_.pitch_m) > 1e-12)
+    faults.push_back({sentence("the pitch is %g m, the dots' %g m", program_.pitch_m, dots_.pitch_m), 0});
+}
+
+void ProgramCheck::check_vias(Faults& faults) const {
+  std::size_t previous = 0;
+  for (const Via& via : program_.vias) {
+    if (via.before_exposure < previous || via.before_exposure > program_.exposures.size())
+      faults.push_back({sentence("a way-point before exposure %u is out of order", via.before_exposure), previous});
+    previous = via.before_exposure;
+    check_limits(via.joints, via.before_exposure, faults);
+  }
+  if (program_.vias.empty() || program_.vias.front().before_exposure != 0 || program_.vias.front().joints != home())
+    faults.push_back({"the program does not start at home", 0});
+  if (program_.vias.empty() || program_.vias.back().before_exposure != program_.exposures.size() ||
+      program_.vias.back().joints != home())
+    faults.push_back({"the program does not end at home", program_.exposures.size()});
+}
+
+/// The comparison is such that NaN fails it.
+bool ProgramCheck::is_inside(int axis, double value) const {
+  const auto& limits = cell_.axes[static_cast<std::size_t>(axis)];
+  return value >= limits.min - kJointTolerance && value <= limits.max + kJointTolerance;
+}
+
+bool ProgramCheck::is_inside(const Joints& joints) const {
+  for (int axis = 0; axis < kAxisCount; ++axis)
+    if (!is_inside(axis, joints[static_cast<std::size_t>(axis)])) return false;
+  return true;
+}
+
+void ProgramCheck::check_limits(const Joints& joints, std::size_t i, Faults& faults) const {
+  for (int axis = 0; axis < kAxisCount; ++axis) {
+    const auto& limits = cell_.axes[static_cast<std::size_t>(axis)];
+    const double value = joints[static_cast<std::size_t>(axis)];
+    if (is_inside(axis, value)) continue;
+    const bool is_length = axis == kJ3;
+    const double unit = is_length ? 1e-3 : kDegree;
+    faults.push_back({sentence("%s at %.6g %s is outside %.6g to %.6g", axis_name(axis), value / unit,
+                               is_length ? "mm" : "degrees", limits.min / unit, limits.max / unit),
+                      i});
+  }
+}
+
+void ProgramCheck::check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Faults& faults) const {
+  const Exposure& exposure = program_.exposures[i];
+  if (exposure.dot_index >= dots_.dots.size()) return;  // counted already
+  const Dot& dot = dots_.dots[exposure.dot_index];
+  if (exposure.position_O != dot.position_O || exposure.normal_O != dot.normal_O || exposure.tone != dot.tone)
+    faults.push_back({sentence("place, normal or tone is not that of dot %u", exposure.dot_index), i});
+
+  const double off_m = (check_cell_.focus_O(X_OF) - dot.position_O).norm();
+  if (!(off_m <= kFocusToleranceM)) faults.push_back({sentence("the focus is %.3g mm off the dot", off_m * 1e3), i});
+  const double cosine = -check_cell_.beam_O(X_OF).dot(dot.normal_O.cast<double>().normalized());
+  const double incidence = std::acos(std::clamp(cosine, -1., 1.));
+  if (!(incidence <= options_.max_incidence + kIncidenceTolerance))
+    faults.push_back({sentence("the beam meets the face at %.3f degrees, more than %.3f", incidence / kDegree,
+                               options_.max_incidence / kDegree),
+                      i});
+  // acos is steep near 0: compare cosines.
+  if (!(std::abs(std::cos(static_cast<double>(exposure.incidence)) - cosine) <= kIncidenceTolerance))
+    faults.push_back({sentence("the incidence is said to be %.3f degrees and is %.3f",
+                               static_cast<double>(exposure.incidence) / kDegree, incidence / kDegree),
+                      i});
+}
+
+void ProgramCheck::check_dose(std::size_t i, Faults& faults) const {
+  const Exposure& exposure = program_.exposures[i];
+  const double power = exposure.power_w, pulse = exposure.pulse_s, energy = exposure.energy_j;
+  const auto& laser = cell_.laser;
+  const auto within = [](double value, double low, double high) {
+    return value >= low * (1 - kEnergyTolerance) && value <= high * (1 + kEnergyTolerance);
+  };
+  if (!within(power, laser.power_min_w, laser.power_max_w))
+    faults.push_back({sentence("%g W is outside the laser's limits", power), i});
+  if (!within(pulse, laser.pulse_min_s, laser.pulse_max_s))
+    faults.push_back({sentence("a pulse of %g s is outside the laser's limits", pulse), i});
+  if (!within(energy, power * pulse, power * pulse))
+    faults.push_back({sentence("%g J is not %g W for %g s", energy, power, pulse), i});
+  if (exposure.dot_index >= dots_.dots.size()) return;
+  const double wanted = dots_.dots[exposure.dot_index].level * full_energy_j(cell_, dots_.pitch_m);
+  if (!within(energy, wanted, wanted))
+    faults.push_back({sentence("%g J is not the %g J that the dot's level asks for", energy, wanted), i});
+}
+
+void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
+  const Joints& joints = program_.exposures[i].joints;
+  check_dose(i, faults);
+  check_limits(joints, i, faults);
+  if (!is_inside(joints)) return;
+  const Eigen::Isometry3d X_OF = check_cell_.X_OF(joints);
+  check_dot(i, X_OF, faults);
+  if (auto fault = check_cell_.beam_fault(X_OF, kLandingToleranceM); !fault.empty()) faults.push_back({fault, i});
+  if (auto fault = check_cell_.body_fault(X_OF); !fault.empty()) faults.push_back({fault, i});
+}
+
+/// What may only happen with the tool drawn back: the elbow going over, half a turn of J4 or C at once.
+void ProgramCheck::check_direct_move(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
+  if (from[kJ2] * to[kJ2] < 0) faults.push_back({"the elbow flips without a retract", i});
+  for (const int axis : {kJ4, kRotation}) {
+    const double turn = std::abs(to[static_cast<std::size_t>(axis)] - from[static_cast<std::size_t>(axis)]);
+    if (!(turn <= 200 * kDegree))
+      faults.push_back({sentence("%s turns by %.0f degrees without a retract", axis_name(axis), turn / kDegree), i});
+  }
+}
+
+void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
+  if (from == to) return;
+  double end_s = 0, sweep_m = 0;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const double distance = std::abs(to[axis] - from[axis]);
+    end_s = std::max(end_s, axis_end_s(distance, cell_.axes[axis]));
+    sweep_m += distance * (axis == kJ3 ? 1 : .25);
+  }
+  const Eigen::Isometry3d X_from = check_cell_.X_OF(from), X_to = check_cell_.X_OF(to);
+  const double travel_m = check_cell_.travel_m(X_from, X_to);
+  if (travel_m < kLookM && sweep_m < 4 * kLookM) return;  // both ends are looked at as poses
+  const int look_count = static_cast<int>(std::ceil(std::max(travel_m, sweep_m) / kLookM));
+  for (int k = 1; k <= look_count; ++k) {
+    Joints now = to;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      now[axis] = from[axis] + std::copysign(axis_position(std::abs(to[axis] - from[axis]), end_s * k / look_count,
+                                                           cell_.axes[axis]),
+                                             to[axis] - from[axis]);
+    const std::string fault = check_cell_.body_fault(check_cell_.X_OF(now));
+    if (fault.empty()) continue;
+    faults.push_back({"on the way there " + fault, i});
+    return;
+  }
+}
+
+void ProgramCheck::check_way(std::size_t i, Faults& faults) const {
+  // Joints outside their limits have been reported; no way leads to or from them.
+  if (i > 0 && !is_inside(program_.exposures[i - 1].joints)) return;
+  if (i < program_.exposures.size() && !is_inside(program_.exposures[i].joints)) return;
+  Joints at = i == 0 ? home() : program_.exposures[i - 1].joints;
+  const auto vias = program_.vias_before(i);
+  for (const Via& via : vias) {
+    check_leg(at, via.joints, i, faults);
+    at = via.joints;
+  }
+  if (i == program_.exposures.size()) return;
+  const Joints& to = program_.exposures[i].joints;
+  if (vias.empty()) check_direct_move(at, to, i, faults);
+  check_leg(at, to, i, faults);
+}
+
+}  // namespace
+
+std::vector<ProgramFault> check_program(const ExposureProgram& program, const std::vector<SkippedDot>& skipped,
+                                        const DotSequence& dots, const TexturedMesh& mesh, const CellDescription& cell,
+                                        const PlanOptions& options, std::size_t limit, const Progress& progress) {
+  const ProgramCheck check(program, dots, mesh, cell, options);
+  Faults faults;
+  check.check_counts(skipped, faults);
+  check.check_vias(faults);
+  if (!faults.empty()) {  // the rest relies on order and counts
+    faults.resize(std::min(faults.size(), limit));
+    return faults;
+  }
+
+  // Blocks have their own lists, joined in order: the same faults for any number of threads.
+  const std::size_t count = program.exposures.size() + 1, block_count = (count + kBlock - 1) / kBlock;
+  constexpr std::size_t kBlocksAtOnce = 16;
+  for (std::size_t first = 0; first < block_count && faults.size() < limit; first += kBlocksAtOnce) {
+    std::vector<Faults> found(std::min(kBlocksAtOnce, block_count - first));
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t b) {
+      const std::size_t begin = (first + b) * kBlock, end = std::min(count, begin + kBlock);
+      for (std::size_t i = begin; i < end && found[b].size() < limit; ++i) {
+        if (i < program.exposures.size()) check.check_exposure(i, found[b]);
+        check.check_way(i, found[b]);
+      }
+    });
+    for (Faults& block : found) faults.insert(faults.end(), block.begin(), block.end());
+    if (progress)
+      progress(static_cast<double>(std::min(first + kBlocksAtOnce, block_count)) / static_cast<double>(block_count));
+  }
+  faults.resize(std::min(faults.size(), limit));
+  return faults;
+}
+
+}  // namespace hilbrush
