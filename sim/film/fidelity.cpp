@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "sim/film/masked_image.h"
 #include "sim/film/orthographic_view.h"
@@ -111,22 +112,29 @@ FidelityFigures surface_figures(const std::vector<Reading>& readings, Counts cou
   return figures;
 }
 
-/// Reachability everywhere, from the readings: that of the nearest one of a similar normal.
+/// Reachability everywhere, from the readings: that of the nearest one of a similar normal. Most places have nothing
+/// unreachable near them, and are answered by one look.
 class ReachMap {
  public:
   ReachMap(const TexturedMesh& mesh, const std::vector<Reading>& readings) : mesh_(mesh), readings_(readings) {
     cell_m_ = 2 * std::sqrt(mesh.area_m2() / static_cast<double>(std::max<std::size_t>(readings.size(), 1)));
-    for (std::uint32_t i = 0; i < readings.size(); ++i)
-      cells_[key(cell_of(position(mesh, readings[i].point)))].push_back(i);
+    for (std::uint32_t i = 0; i < readings.size(); ++i) {
+      const Eigen::Vector3i cell = cell_of(position(mesh, readings[i].point));
+      cells_[key(cell)].push_back(i);
+      if (!readings[i].is_reachable)
+        for (int k = 0; k < 27; ++k) doubtful_.insert(key(cell + neighbor(k)));
+    }
   }
 
   bool is_reachable(const SurfacePoint& point) const {
-    const Eigen::Vector3d p_O = position(mesh_, point), normal_O = face_normal(mesh_, point);
+    const Eigen::Vector3d p_O = position(mesh_, point);
     const Eigen::Vector3i middle = cell_of(p_O);
+    if (!doubtful_.contains(key(middle))) return true;
+    const Eigen::Vector3d normal_O = face_normal(mesh_, point);
     double nearest = std::numeric_limits<double>::infinity();
     bool reachable = true;
     for (int k = 0; k < 27; ++k) {
-      const auto found = cells_.find(key(middle + Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
+      const auto found = cells_.find(key(middle + neighbor(k)));
       if (found == cells_.end()) continue;
       for (const std::uint32_t i : found->second) {
         const double distance = (position(mesh_, readings_[i].point) - p_O).squaredNorm();
@@ -138,6 +146,7 @@ class ReachMap {
   }
 
  private:
+  static Eigen::Vector3i neighbor(int k) { return {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}; }
   Eigen::Vector3i cell_of(const Eigen::Vector3d& p_O) const { return (p_O / cell_m_).array().floor().cast<int>(); }
   static std::uint64_t key(const Eigen::Vector3i& cell) {
     std::uint64_t key = 0;
@@ -149,6 +158,7 @@ class ReachMap {
   const std::vector<Reading>& readings_;
   double cell_m_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+  std::unordered_set<std::uint64_t> doubtful_;  ///< cells with an unreachable reading in or beside them
 };
 
 /// The six directions of S2: along the axes, turned so that nothing drawn parallel to them falls in line with the
@@ -164,8 +174,8 @@ std::array<ViewDirection, 6> measuring_views() {
   return views;
 }
 
-/// Sum of local SSIM (Wang et al. 2004, window sigma 1.5 pixels) and the number of pixels that it is over.
-std::pair<double, double> ssim_sum(const MaskedImage& picture) {
+/// Local SSIM of the two channels (Wang et al. 2004, window sigma 1.5 pixels) as a picture of one channel.
+MaskedImage ssim(const MaskedImage& picture) {
   constexpr double kC1 = .01 * .01, kC2 = .03 * .03, kWindowSigma = 1.5;
   MaskedImage products(picture.width, picture.height, 5);
   products.weights = picture.weights;
@@ -175,54 +185,58 @@ std::pair<double, double> ssim_sum(const MaskedImage& picture) {
     for (int k = 0; k < 5; ++k) products.channels[k][i] = values[k];
   }
   const MaskedImage means = masked_blur(products, kWindowSigma);
-  double sum = 0, count = 0;
+  MaskedImage similarity(picture.width, picture.height, 1);
+  similarity.weights = means.weights;
   for (std::size_t i = 0; i < means.weights.size(); ++i) {
-    if (!(means.weights[i] > 0)) continue;
     const double a = means.channels[0][i], b = means.channels[1][i];
     const double variance_a = means.channels[2][i] - a * a, variance_b = means.channels[3][i] - b * b,
                  covariance = means.channels[4][i] - a * b;
-    sum += (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (variance_a + variance_b + kC2));
-    count += 1;
+    similarity.channels[0][i] = static_cast<float>((2 * a * b + kC1) * (2 * covariance + kC2) /
+                                                   ((a * a + b * b + kC1) * (variance_a + variance_b + kC2)));
   }
-  return {sum, count};
+  return similarity;
 }
 
-/// S2 over all film that is seen, or over what `reach` accepts.
+/// S2 of the views added so far. What is reachable is decided for the pixels that are scored; the blur before sees all
+/// film, so that the border of an unreachable place counts against the picture.
 class ViewSimilarity {
  public:
-  void add(const MaskedImage& picture, double pixels_a_pitch) {
+  void add(const MaskedImage& picture, const OrthographicView& view, double pixels_a_pitch, const ReachMap& reach) {
     const int step = std::max(1, static_cast<int>(std::lround(pixels_a_pitch)));
-    const auto [sum, count] = ssim_sum(masked_blur(picture, 2 * pixels_a_pitch, step));
-    sum_ += sum, count_ += count;
+    const MaskedImage similarity = ssim(masked_blur(picture, 2 * pixels_a_pitch, step));
+    for (int y = 0; y < similarity.height; ++y)
+      for (int x = 0; x < similarity.width; ++x) {
+        const std::size_t i = similarity.index(x, y);
+        if (!(similarity.weights[i] > 0)) continue;
+        const double value = similarity.channels[0][i];
+        whole_sum_ += value, whole_count_ += 1;
+        const int view_x = std::min(x * step + step / 2, view.width() - 1),
+                  view_y = std::min(y * step + step / 2, view.height() - 1);
+        if (reach.is_reachable(view.pixel(view_x, view_y).point)) reachable_sum_ += value, reachable_count_ += 1;
+      }
   }
-  double mean() const { return count_ > 0 ? sum_ / count_ : 0; }
+  double whole() const { return whole_count_ > 0 ? whole_sum_ / whole_count_ : 0; }
+  double reachable() const { return reachable_count_ > 0 ? reachable_sum_ / reachable_count_ : 0; }
 
  private:
-  double sum_ = 0, count_ = 0;
+  double whole_sum_ = 0, whole_count_ = 0, reachable_sum_ = 0, reachable_count_ = 0;
 };
 
 /// Fills wanted (channel 0) and painted (channel 1) coverage of what the view shows.
 MaskedImage look(const Film& film, const ToneField& tone, const OrthographicView& view) {
   MaskedImage picture(view.width(), view.height(), 2);
   tbb::parallel_for(0, view.height(), [&](int y) {
+    thread_local std::vector<OrthographicView::Pixel> pixels;
+    view.read_row(y, pixels);
     for (int x = 0; x < view.width(); ++x) {
-      if (view.side(x, y) != OrthographicView::Side::kFront) continue;
-      const SurfacePoint point = view.point(x, y);
+      if (pixels[x].side != OrthographicView::Side::kFront) continue;
       const std::size_t i = picture.index(x, y);
       picture.weights[i] = 1;
-      picture.channels[0][i] = static_cast<float>(tone.wanted(point));
-      picture.channels[1][i] = static_cast<float>(film.painted(point));
+      picture.channels[0][i] = static_cast<float>(tone.wanted(pixels[x].point));
+      picture.channels[1][i] = static_cast<float>(film.painted(pixels[x].point));
     }
   });
   return picture;
-}
-
-void keep_reachable(MaskedImage& picture, const OrthographicView& view, const ReachMap& reach) {
-  tbb::parallel_for(0, view.height(), [&](int y) {
-    for (int x = 0; x < view.width(); ++x)
-      if (picture.weights[picture.index(x, y)] > 0 && !reach.is_reachable(view.point(x, y)))
-        picture.weights[picture.index(x, y)] = 0;
-  });
 }
 
 /// A third of a pitch; more for objects so large that a view would take more than some 24 million pixels.
@@ -261,20 +275,15 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
 
   const ReachMap reach(film.mesh(), readings);
   const double pixel_m = measuring_pixel_m(film);
-  ViewSimilarity whole, reachable;
+  ViewSimilarity similarity;
   int seen = 0;
   for (const ViewDirection& direction : measuring_views()) {
     const OrthographicView view(film.mesh(), direction, pixel_m);
-    MaskedImage picture = look(film, tone, view);
-    whole.add(picture, film.pitch_m() / pixel_m);
-    if (unreachable > 0) {
-      keep_reachable(picture, view, reach);
-      reachable.add(picture, film.pitch_m() / pixel_m);
-    }
+    similarity.add(look(film, tone, view), view, film.pitch_m() / pixel_m, reach);
     if (progress) progress(.5 + .5 * ++seen / 6);
   }
-  fidelity.whole.s2 = whole.mean();
-  fidelity.reachable.s2 = unreachable > 0 ? reachable.mean() : whole.mean();
+  fidelity.whole.s2 = similarity.whole();
+  fidelity.reachable.s2 = similarity.reachable();
   return fidelity;
 }
 

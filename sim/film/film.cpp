@@ -29,9 +29,37 @@ Touch touch(std::uint32_t tile, std::size_t spot) {
 
 }  // namespace
 
+/// The paint's response at fixed steps up to a few full doses, for pictures and measurements that ask millions of
+/// times. Between steps linear: wrong by less than 2e-6. The kink of the linear response lies on a step.
+class ResponseTable {
+ public:
+  explicit ResponseTable(PaintResponse response) : response_(response) {
+    for (std::size_t i = 0; i < coverages_.size(); ++i)
+      coverages_[i] = painted_coverage(response, static_cast<double>(i) / kStepsAFullDose);
+  }
+  double operator()(double x) const {
+    const double place = x * kStepsAFullDose;
+    if (!(place < static_cast<double>(coverages_.size() - 1))) return painted_coverage(response_, x);
+    if (place <= 0) return coverages_.front();
+    const auto i = static_cast<std::size_t>(place);
+    return coverages_[i] + (place - static_cast<double>(i)) * (coverages_[i + 1] - coverages_[i]);
+  }
+
+ private:
+  static constexpr double kStepsAFullDose = 1024;
+  PaintResponse response_;
+  std::array<double, 4097> coverages_;
+};
+
 struct Film::Implementation {
   Implementation(const TexturedMesh& m, const CellDescription& c, double pitch)
-      : mesh(m), cell(c), pitch_m(pitch), waist_m(spot_diameter_m(c, pitch) / 2), index(m), lattice(m, pitch / 2) {}
+      : mesh(m),
+        cell(c),
+        pitch_m(pitch),
+        waist_m(spot_diameter_m(c, pitch) / 2),
+        index(m),
+        lattice(m, pitch / 2),
+        response(c.paint.response) {}
 
   Hit land(const Emission& emission, Spot& spot) const;
   std::vector<Touch> touches(std::span<const Spot> spots) const;
@@ -42,6 +70,7 @@ struct Film::Implementation {
   const double pitch_m, waist_m;
   const SurfaceIndex index;
   FilmLattice lattice;
+  const ResponseTable response;
 };
 
 /// Where the emission's beam meets the mesh; `spot` keeps no energy if it meets nothing.
@@ -144,8 +173,7 @@ double Film::painted(const SurfacePoint& point) const {
 }
 
 double Film::painted(double dose_j_m2) const {
-  const CellDescription::Paint& paint = implementation_->cell.paint;
-  return painted_coverage(paint.response, dose_j_m2 / paint.dose_full_j_m2);
+  return implementation_->response(dose_j_m2 / implementation_->cell.paint.dose_full_j_m2);
 }
 
 void Film::points_near(const SurfacePoint& center, double radius_m, std::vector<FilmPoint>& points) const {

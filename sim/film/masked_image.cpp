@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -31,9 +32,10 @@ std::vector<float> blur_rows(const std::vector<float>& plane, int width, int hei
       for (int i = 0; i < out_width; ++i) {
         const int x = std::min(i * step + step / 2, width - 1);
         const int begin = std::max(x - radius, static_cast<int>(first_lit)), end = std::min(x + radius, width - 1);
-        float sum = 0;
-        for (int k = begin; k <= end; ++k) sum += taps[k - x + radius] * row[k];
-        out[static_cast<std::size_t>(i) * height + y] = sum;
+        if (end < begin) continue;
+        const Eigen::Index count = end - begin + 1;
+        const Eigen::Map<const Eigen::VectorXf> values(row + begin, count), weights(&taps[begin - x + radius], count);
+        out[static_cast<std::size_t>(i) * height + y] = values.dot(weights);
       }
     }
   });

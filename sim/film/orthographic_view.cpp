@@ -5,20 +5,16 @@
 
 namespace hilbrush {
 
-namespace {
-
-/// Barycentric coordinates of (x, y) in a projected triangle: value_k = constant_k + x dx_k + y dy_k. Not finite for a
+/// Barycentric coordinates of (x, y) in a projected triangle: value_k = constant_k + x dx_k + y dy_k. None for a
 /// triangle seen edge-on.
-struct PlaneCoordinates {
+struct OrthographicView::PlaneCoordinates {
   Eigen::Vector3d constant, dx, dy;
   bool is_valid = false;
-  bool faces_eye = false;
 
   PlaneCoordinates(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
     const double area = (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
     is_valid = std::abs(area) > 1e-12;
     if (!is_valid) return;
-    faces_eye = area < 0;  // rows run downwards
     dx = Eigen::Vector3d(b.y() - c.y(), c.y() - a.y(), a.y() - b.y()) / area;
     dy = Eigen::Vector3d(c.x() - b.x(), a.x() - c.x(), b.x() - a.x()) / area;
     constant =
@@ -27,8 +23,6 @@ struct PlaneCoordinates {
   }
   Eigen::Vector3d at(double x, double y) const { return constant + x * dx + y * dy; }
 };
-
-}  // namespace
 
 OrthographicView::OrthographicView(const TexturedMesh& mesh, const ViewDirection& direction, double pixel_m, int margin)
     : mesh_(mesh),
@@ -93,18 +87,34 @@ void OrthographicView::fill(std::uint32_t triangle) {
   }
 }
 
-OrthographicView::Side OrthographicView::side(int x, int y) const {
-  const std::uint32_t triangle = triangles_[static_cast<std::size_t>(y) * width_ + x];
-  if (triangle == kNothing) return Side::kBackground;
-  return mesh_.area_vector(triangle).dot(forward_O_) < 0 ? Side::kFront : Side::kBack;
+OrthographicView::PlaneCoordinates OrthographicView::coordinates_of(std::uint32_t triangle) const {
+  return {project(mesh_.corner(triangle, 0)), project(mesh_.corner(triangle, 1)), project(mesh_.corner(triangle, 2))};
 }
 
-SurfacePoint OrthographicView::point(int x, int y) const {
-  const std::uint32_t triangle = triangles_[static_cast<std::size_t>(y) * width_ + x];
-  const PlaneCoordinates coordinates(project(mesh_.corner(triangle, 0)), project(mesh_.corner(triangle, 1)),
-                                     project(mesh_.corner(triangle, 2)));
+OrthographicView::Pixel OrthographicView::pixel(int x, int y) const {
+  const std::uint32_t triangle = triangle_at(x, y);
+  if (triangle == kNothing) return {};
+  return pixel_on(triangle, coordinates_of(triangle), x, y);
+}
+
+OrthographicView::Pixel OrthographicView::pixel_on(std::uint32_t triangle, const PlaneCoordinates& coordinates, int x,
+                                                   int y) const {
+  const Side side = mesh_.area_vector(triangle).dot(forward_O_) < 0 ? Side::kFront : Side::kBack;
   const Eigen::Vector3d inside = coordinates.at(x + .5, y + .5).cwiseMax(0.);
-  return {triangle, inside / inside.sum()};
+  return {side, {triangle, inside / inside.sum()}};
+}
+
+void OrthographicView::read_row(int y, std::vector<Pixel>& pixels) const {
+  pixels.assign(width_, {});
+  for (int x = 0; x < width_;) {
+    const std::uint32_t triangle = triangle_at(x, y);
+    if (triangle == kNothing) {
+      ++x;
+      continue;
+    }
+    const PlaneCoordinates coordinates = coordinates_of(triangle);
+    for (; x < width_ && triangle_at(x, y) == triangle; ++x) pixels[x] = pixel_on(triangle, coordinates, x, y);
+  }
 }
 
 std::optional<Eigen::Vector2i> OrthographicView::pixel_of(const Eigen::Vector3d& p_O, double tolerance_m) const {

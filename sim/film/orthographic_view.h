@@ -30,10 +30,13 @@ class OrthographicView {
   double pixel_m() const { return pixel_m_; }
 
   enum class Side : std::uint8_t { kBackground, kFront, kBack };
-  /// What pixel (x, y) shows; row 0 is the top. Back: a face seen from behind, which carries no film.
-  Side side(int x, int y) const;
-  /// The place that the middle of a pixel shows; only where side() is not kBackground.
-  SurfacePoint point(int x, int y) const;
+  struct Pixel {
+    Side side = Side::kBackground;  ///< back: a face seen from behind, which carries no film
+    SurfacePoint point;             ///< what the middle of the pixel shows; of no meaning on the background
+  };
+  Pixel pixel(int x, int y) const;
+  /// Replaces `pixels` by row y, 0 being the top. Cheaper than one by one.
+  void read_row(int y, std::vector<Pixel>& pixels) const;
   /// The pixel at which p_O is seen, if nothing is more than tolerance_m in front of it.
   std::optional<Eigen::Vector2i> pixel_of(const Eigen::Vector3d& p_O, double tolerance_m) const;
 
@@ -42,6 +45,11 @@ class OrthographicView {
 
   Eigen::Vector3d project(const Eigen::Vector3d& p_O) const;  ///< x and y in pixels, depth in metres
   void fill(std::uint32_t triangle);
+  std::uint32_t triangle_at(int x, int y) const { return triangles_[static_cast<std::size_t>(y) * width_ + x]; }
+
+  struct PlaneCoordinates;
+  PlaneCoordinates coordinates_of(std::uint32_t triangle) const;
+  Pixel pixel_on(std::uint32_t triangle, const PlaneCoordinates& coordinates, int x, int y) const;
 
   const TexturedMesh& mesh_;
   const Eigen::Vector3d right_O_, up_O_, forward_O_;

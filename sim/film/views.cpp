@@ -55,18 +55,15 @@ ViewPicture reduced(const ViewPicture& view, int factor) {
 }
 
 void fill_row(const Film& film, const ToneField& tone, const OrthographicView& view, int y, MaskedImage& image) {
+  std::vector<OrthographicView::Pixel> pixels;
+  view.read_row(y, pixels);
   for (int x = 0; x < view.width(); ++x) {
-    const auto side = view.side(x, y);
-    if (side == OrthographicView::Side::kBackground) continue;
     const std::size_t i = image.index(x, y);
-    if (side == OrthographicView::Side::kBack) {
-      image.channels[kBack][i] = 1;
-      continue;
-    }
-    const SurfacePoint point = view.point(x, y);
+    if (pixels[x].side == OrthographicView::Side::kBack) image.channels[kBack][i] = 1;
+    if (pixels[x].side != OrthographicView::Side::kFront) continue;
     image.weights[i] = 1;
-    image.channels[kWanted][i] = static_cast<float>(tone.wanted(point));
-    image.channels[kPainted][i] = static_cast<float>(film.painted(point));
+    image.channels[kWanted][i] = static_cast<float>(tone.wanted(pixels[x].point));
+    image.channels[kPainted][i] = static_cast<float>(film.painted(pixels[x].point));
   }
 }
 
