@@ -13,6 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestUrl = 1024;
+constexpr std::size_t kSpellingLimit = 16;
 constexpr std::size_t kChunk = 1 << 18;
 
 int hex_digit(char c) {
@@ -49,8 +50,12 @@ std::vector<std::string> spellings(const std::string& url) {
   std::replace(plain.begin(), plain.end(), '\\', '/');
   add(plain);
   add(percent_decoded(plain));
-  const std::string bare = out.back();
-  add(bare.substr(bare.rfind('/') + 1));
+  // Exporters write paths of the machine they ran on; the file may lie here under the end of such a path.
+  std::string tail = out.back();
+  for (std::size_t slash; out.size() < kSpellingLimit && (slash = tail.find('/')) != tail.npos;) {
+    tail.erase(0, slash + 1);
+    add(tail);
+  }
   return out;
 }
 

@@ -16,8 +16,8 @@ class ModelFolder {
   ModelFolder(const std::filesystem::path& model_file, std::size_t file_bytes);
 
   /// Finds the file that `url`, written in a file of folder `base`, means: as written, with \ for / and %20 for a
-  /// space, and (as exporters like to write paths of their own machine) by its last part alone. Null with the reason if
-  /// it is not there, not a regular file, or not below the model's folder.
+  /// space, and (as exporters like to write paths of their own machine) by ever shorter ends of it. Null with the
+  /// reason if it is not there, not a regular file, or not below the model's folder.
   std::optional<std::filesystem::path> find(const std::filesystem::path& base, const std::string& url,
                                             std::string& reason) const;
 

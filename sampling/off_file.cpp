@@ -40,9 +40,11 @@ struct Header {
 Header read_header(OffLines& lines, const ModelLimits& limits) {
   Header header;
   std::string_view line = lines.next("OFF");
-  const std::string_view word = take_word(line);
-  if (word.size() < 3 || word.substr(word.size() - 3) != "OFF") lines.fail("expected OFF");
-  const std::string_view letters = word.substr(0, word.size() - 3);
+  // A count may follow the word without a blank: OFF8 6 12.
+  const std::size_t word_end = line.find("OFF");
+  if (word_end == line.npos || word_end > 4) lines.fail("expected OFF");
+  const std::string_view letters = line.substr(0, word_end);
+  line.remove_prefix(word_end + 3);
   header.has_normals = letters.find('N') != letters.npos;
   header.has_uv = letters.find("ST") != letters.npos;
   line = trimmed(line);
@@ -124,7 +126,7 @@ Model load_off(std::string text, const std::string& name, ModelFolder& folder, c
   std::string ply = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(header.vertices) +
                     "\nproperty float x\nproperty float y\nproperty float z\n" +
                     (have_colors ? color_names : ignored_names) + "element face " + std::to_string(header.faces) +
-                    "\nproperty list uint uint vertex_indices\n" + (have_face_colors ? color_names : ignored_names) +
+                    "\nproperty list int uint vertex_indices\n" + (have_face_colors ? color_names : ignored_names) +
                     "end_header\n";
   ply += vertices;
   ply += faces;

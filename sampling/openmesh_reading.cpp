@@ -20,7 +20,8 @@ void read_with_openmesh(std::string bytes, const std::string& name, bool stops_a
     if (stops_at_fault) in.exceptions(std::ios::failbit | std::ios::badbit);
     is_read = read(in);
   } catch (const std::ios_base::failure&) {
-    throw InputError(name, "the file ends early, or something that is no number stands where one must be");
+    throw InputError(
+        name, "the file ends early, holds something that is no number, or more or fewer numbers than its header says");
   }
   if (!is_read) throw InputError(name, "the file can't be understood");
 }

@@ -222,6 +222,11 @@ void check_header(const PlyHeader& header, const std::string& name, std::size_t 
                    std::to_string(body_bytes) + " found)");
 }
 
+/// OpenMesh counts lists in these types only; no list is so long that the sign matters.
+std::string counting_name(const std::string& type) {
+  return size_of(type) == 1 ? "uchar" : size_of(type) == 2 ? "uint16" : "int";
+}
+
 /// The header as OpenMesh understands it, up to the faces.
 std::string plain_header(const PlyHeader& header) {
   std::string text = "ply\nformat " + header.format + " 1.0\n";
@@ -229,7 +234,8 @@ std::string plain_header(const PlyHeader& header) {
     text += "element " + element.name + " " + std::to_string(element.count) + "\n";
     for (const PlyProperty& p : element.properties) {
       const bool is_known = element.name == "vertex" || element.name == "face";
-      text += "property " + (p.count_type.empty() ? p.type : "list " + p.count_type + " " + p.type) + " " +
+      text += "property " + (p.count_type.empty() ? p.type : "list " + counting_name(p.count_type) + " " + p.type) +
+              " " +
               (is_indices(p) ? "vertex_indices"
                : is_known    ? known_name(p.name)
                              : p.name) +

@@ -33,7 +33,8 @@ FaceList elevation_grid(const Reference& node, const SurfaceParts& parts, float 
       faces.points.emplace_back(spacing_x * static_cast<double>(x), height[z * columns + x],
                                 spacing_z * static_cast<double>(z));
 
-  const std::vector<double>& uv = numbers_of(parts.texture_coordinates ? parts.texture_coordinates : node, "point");
+  static const std::vector<double> none;
+  const std::vector<double>& uv = parts.texture_coordinates ? numbers_of(parts.texture_coordinates, "point") : none;
   const bool has_uv = uv.size() >= 2 * faces.points.size();
   const std::vector<float> colors =
       parts.colors ? luminances_of(numbers_of(parts.colors, "color")) : std::vector<float>();

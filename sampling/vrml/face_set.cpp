@@ -61,6 +61,7 @@ Outlines read_outlines(const std::vector<double>& coord_index, FaceList& faces) 
 void read_texture_coordinates(const Reference& node, const Reference& texture_coordinates, const Outlines& outlines,
                               FaceList& faces, std::vector<std::string>& warnings) {
   const std::vector<Vector2d> points = pairs_of(numbers_of(texture_coordinates, "point"));
+  if (points.empty()) return;  // as exporters write what they do not use
   const CornerIndices index(numbers_of(node, "texCoordIndex"), numbers_of(node, "coordIndex"));
   std::size_t missing = 0;
   for (const std::size_t place : outlines.place_of_corner) {
@@ -79,6 +80,7 @@ void read_texture_coordinates(const Reference& node, const Reference& texture_co
 void read_colors(const Reference& node, const Reference& colors, const Outlines& outlines, float otherwise,
                  FaceList& faces, std::vector<std::string>& warnings) {
   const std::vector<float> luminances = luminances_of(numbers_of(colors, "color"));
+  if (luminances.empty()) return;
   const std::vector<double>& color_index = numbers_of(node, "colorIndex");
   std::size_t missing = 0;
   const auto add = [&](const float* luminance) {

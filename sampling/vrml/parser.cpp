@@ -120,6 +120,11 @@ class Parser {
       return parse_body(name, "", token.line);
     }
     if (lexer_.peek().kind != TokenKind::kWord) fail(lexer_.peek(), "a node type after DEF " + name);
+    while (lexer_.peek().is_word("DEF")) {
+      warn(token.line, "DEF " + name.substr(0, 80) + " is followed by another DEF, which is taken instead");
+      lexer_.take();
+      name = take_name("a name after DEF");
+    }
     if (lexer_.peek().is_word("NULL")) return lexer_.take(), nullptr;
     return parse_body(std::string(lexer_.take().text), name, token.line);
   }

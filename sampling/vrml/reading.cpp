@@ -16,6 +16,13 @@ constexpr std::size_t kUrlLimit = 16;         // tried of one list
 constexpr std::size_t kLookupLimit = 20'000;  // file look-ups of one model
 constexpr std::size_t kWorkPerTriangle = 16;
 
+/// Geometry where a Shape must stand around it.
+bool is_bare_geometry(const std::string& type) {
+  static const std::set<std::string> types{"Box",           "Sphere",   "Cylinder", "Cone", "IndexedFaceSet",
+                                           "ElevationGrid", "Extrusion"};
+  return types.count(type) > 0;
+}
+
 /// Nodes that belong to a scene but never to a surface; nobody misses them.
 bool is_scenery(const std::string& type) {
   static const std::set<std::string> types{
@@ -166,10 +173,11 @@ std::string Reading::no_surface_sentence() const {
   std::string sentence = "there is no surface to paint";
   std::string types;
   for (const auto& [type, entry] : ignored_)
-    types += (types.empty() ? "" : ", ") + std::to_string(entry.count) + " " + type.substr(0, 60);
+    types += (types.empty() ? "" : ", ") + std::to_string(entry.count) + " " + type.substr(0, 60) +
+             (is_bare_geometry(type) ? " (without a Shape around it)" : "");
   if (missing_inline_count_ > 0)
     sentence += "; " + std::to_string(missing_inline_count_) + " inlined files are missing";
-  if (!types.empty()) sentence += "; nodes that are not surfaces or not known: " + types;
+  if (!types.empty()) sentence += "; nodes that make no surface or are not known: " + types;
   return sentence;
 }
 
