@@ -10,13 +10,14 @@
 #include "sampling/tone_field.h"
 
 /// Mesh to dots, the entry of sampling/:
-///   repair_mesh -> components -> cut_to_disk -> square_map -> surface_curve (adaptive Hilbert quadtree) -> strata -> dots.
+///   repair_mesh -> components -> cut_to_disk -> square_map -> surface_curve (adaptive Hilbert quadtree) -> strata ->
+///   dots.
 /// A component that can't be mapped validly is ordered along a 3D Hilbert curve, and the report says why.
 namespace hilbrush {
 
 struct ComponentReport {
   std::size_t triangle_count = 0;
-  int genus = -1;            ///< -1: not a manifold of known genus
+  int genus = -1;  ///< -1: not a manifold of known genus
   int boundary_loops = 0;
   double area_m2 = 0;
   bool is_mapped = false;    ///< on the square; else in 3D Hilbert order
@@ -24,12 +25,13 @@ struct ComponentReport {
 };
 
 struct SampleReport {
-  double path_length_m = 0;      ///< along the dots, in order, jumps between components included
-  double path_constant = 0;      ///< path_length / sqrt(count * painted area)
-  std::size_t patch_count = 0;   ///< leaves of the quadtree that were visited
+  double path_length_m = 0;     ///< along the dots, in order, jumps between components included
+  double path_constant = 0;     ///< path_length / sqrt(count * painted area)
+  std::size_t patch_count = 0;  ///< leaves of the quadtree that were visited
 };
 
-/// The curve over one repaired mesh. Independent of tone, count and sampler, so that re-sampling costs only the last step.
+/// The curve over one repaired mesh. Independent of tone, count and sampler, so that re-sampling costs only the last
+/// step.
 class SurfaceCurve {
  public:
   /// Keeps a reference to `mesh`, which must outlive it. @throws InputError if the mesh has no area.
@@ -49,7 +51,8 @@ class SurfaceCurve {
 
 /// Spreads dots along the curve so that every stretch of equal mass (asked coverage times area) gets one.
 /// Same input and seed: same bytes, whatever the number of threads.
-/// @throws InputError if the surface asks for no dots at all, neither or both of pitch and count are given, or dot_limit is exceeded.
+/// @throws InputError if the surface asks for no dots at all, neither or both of pitch and count are given, or
+/// dot_limit is exceeded.
 DotSequence place_dots(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
                        SampleReport* report = nullptr, const Progress& progress = {});
 

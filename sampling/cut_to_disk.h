@@ -1,0 +1,23 @@
+#pragma once
+#include <optional>
+#include <string>
+
+#include "sampling/disk.h"
+
+/// Makes a topological disk of a component: closed ones are cut open, holes are filled.
+namespace hilbrush {
+
+struct CutDisk {
+  Disk disk;
+  BoundaryLoop
+      outer;  ///< the one boundary, counter-clockwise seen from outside; of a cut it begins where the cut begins
+  bool is_cut = false;
+};
+
+/// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter; more branches
+/// shear the map and lengthen the curve). With boundaries: the longest loop is the outer one, the others are filled.
+/// Returns nothing, and a reason, for what has handles or is not a manifold.
+std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
+                                   std::string& reason);
+
+}  // namespace hilbrush

@@ -1,0 +1,229 @@
+#include "sampling/square_map.h"
+
+#include <iostream>  // Eigen/MetisSupport forgets it
+
+
+#include <Eigen/MetisSupport>
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseLU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "sampling/check.h"
+#include "sampling/orientation.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Sparse = Eigen::SparseMatrix<double>;
+
+constexpr double kLeastWeight = 1e-2, kMostWeight = 1e3;
+/// Below this METIS has nothing to gain.
+constexpr Eigen::Index kSmallSystem = 2000;
+/// A boundary vertex that turns by more is a corner of the shape itself.
+constexpr double kShapeCornerTurn_rad = std::numbers::pi / 4;
+constexpr double kLeastSideShare = .03;
+
+double angle(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+double angle_at(const Disk& disk, std::uint32_t face, std::size_t corner) {
+  const Triangle& f = disk.faces()[face];
+  const Vector3d& p = disk.positions()[f[corner]];
+  return angle(disk.positions()[f[(corner + 1) % 3]] - p, disk.positions()[f[(corner + 2) % 3]] - p);
+}
+
+/// Where along the outer loop the four corners of the square go, as indices of its sides, rising.
+using Corners = std::array<std::size_t, 4>;
+
+/// Length along the loop before each side, and all of it at the end.
+std::vector<double> lengths_along(const CutDisk& cut) {
+  std::vector<double> along{0};
+  for (const TriangleSide s : cut.outer) along.push_back(along.back() + cut.disk.length(s));
+  return along;
+}
+
+std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<double>& along) {
+  std::vector<double> turn(cut.disk.positions().size(), std::numbers::pi);
+  for (std::uint32_t f = 0; f < cut.disk.faces().size(); ++f)
+    for (std::size_t c = 0; c < 3; ++c) turn[cut.disk.faces()[f][c]] -= angle_at(cut.disk, f, c);
+  std::vector<std::size_t> order(cut.outer.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return turn[cut.disk.from(cut.outer[a])] > turn[cut.disk.from(cut.outer[b])] + 1e-9;
+  });
+  Corners corners{order[0], order[1], order[2], order[3]};
+  if (turn[cut.disk.from(cut.outer[corners[3]])] < kShapeCornerTurn_rad) return std::nullopt;
+  std::sort(corners.begin(), corners.end());
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double length =
+        k < 3 ? along[corners[k + 1]] - along[corners[k]] : along.back() - along[corners[3]] + along[corners[0]];
+    if (length < kLeastSideShare * along.back()) return std::nullopt;
+  }
+  return corners;
+}
+
+Corners corners_by_length(const std::vector<double>& along) {
+  const std::size_t n = along.size() - 1;
+  Corners corners{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double wanted = (static_cast<double>(k) + .5) / 4 * along.back();
+    const auto above = static_cast<std::size_t>(std::lower_bound(along.begin(), along.end(), wanted) - along.begin());
+    const std::size_t nearest = above > 0 && wanted - along[above - 1] < along[above] - wanted ? above - 1 : above;
+    corners[k] = std::min(std::max(nearest, k == 0 ? 0 : corners[k - 1] + 1), n - 4 + k);
+  }
+  return corners;
+}
+
+/// The boundary's places on the square, and which sides of the square a vertex lies on (bits; corners have two).
+struct SquareBoundary {
+  SquareMap places;
+  std::vector<std::uint8_t> sides;
+  std::vector<char> is_boundary;
+};
+
+SquareBoundary place_boundary(const CutDisk& cut) {
+  const std::vector<double> along = lengths_along(cut);
+  const auto shape = cut.is_cut ? std::nullopt : corners_of_shape(cut, along);
+  const Corners corners = shape ? *shape : corners_by_length(along);
+  const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(1, 0), Vector2d(1, 1), Vector2d(0, 1)};
+
+  SquareBoundary boundary;
+  boundary.places.assign(cut.disk.positions().size(), Vector2d(.5, .5));
+  boundary.sides.assign(boundary.places.size(), 0);
+  boundary.is_boundary.assign(boundary.places.size(), 0);
+  const std::size_t n = cut.outer.size();
+  for (std::size_t k = 0; k < 4; ++k) {
+    const std::size_t begin = corners[k], end = k < 3 ? corners[k + 1] : corners[0] + n;
+    const auto at = [&](std::size_t i) { return along[i % n] + (i >= n ? along.back() : 0); };
+    for (std::size_t i = begin; i <= end; ++i) {
+      const std::uint32_t v = cut.disk.from(cut.outer[i % n]);
+      const double f = (at(i) - at(begin)) / (at(end) - at(begin));
+      boundary.places[v] = i == end ? square[(k + 1) % 4] : Vector2d(square[k] + f * (square[(k + 1) % 4] - square[k]));
+      boundary.sides[v] |= static_cast<std::uint8_t>(1u << k);
+      boundary.is_boundary[v] = 1;
+    }
+  }
+  return boundary;
+}
+
+/// An inner edge between two vertices on one side of the square would be mapped onto that side, with all that it cuts
+/// off.
+void split_chords(Disk& disk, SquareBoundary& boundary) {
+  const auto face_count = static_cast<std::uint32_t>(disk.faces().size());
+  for (std::uint32_t f = 0; f < face_count; ++f)
+    for (std::uint8_t s = 0; s < 3; ++s) {
+      const TriangleSide side{f, s};
+      if (disk.neighbours()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
+        continue;
+      disk.split_edge(side);
+      boundary.places.emplace_back(.5, .5);
+      boundary.sides.push_back(0);
+      boundary.is_boundary.push_back(0);
+    }
+}
+
+/// Weight of the arc from a vertex to the next corner of a face, the half that this face gives.
+using HalfWeight = double (*)(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to);
+
+double cotan_half(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to) {
+  const std::size_t apex = 3 - from - to;
+  const double tangent = std::tan(angle_at(disk, face, apex));
+  const double cotan = std::abs(tangent) < 1e-9 ? std::copysign(1e9, tangent) : 1 / tangent;
+  return std::clamp(cotan, kLeastWeight, kMostWeight);
+}
+
+double mean_value_half(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to) {
+  const Triangle& f = disk.faces()[face];
+  const double length = (disk.positions()[f[to]] - disk.positions()[f[from]]).norm();
+  const double weight = length > 0 ? std::tan(angle_at(disk, face, from) / 2) / length : 0;
+  return std::max(weight, 1e-12);
+}
+
+/// The linear system for the inner vertices: every one is the weighted mean of its neighbours.
+struct MapSystem {
+  Sparse matrix;
+  Eigen::MatrixX2d right;
+  std::vector<std::uint32_t> inner;  ///< the vertices
+};
+
+MapSystem assemble(const Disk& disk, const SquareBoundary& boundary, HalfWeight half) {
+  MapSystem system;
+  std::vector<int> index(boundary.places.size(), -1);
+  for (std::uint32_t v = 0; v < index.size(); ++v)
+    if (!boundary.is_boundary[v]) {
+      index[v] = static_cast<int>(system.inner.size());
+      system.inner.push_back(v);
+    }
+  const auto n = static_cast<Eigen::Index>(system.inner.size());
+  system.right = Eigen::MatrixX2d::Zero(n, 2);
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(12 * disk.faces().size());
+  const auto add = [&](std::uint32_t v, std::uint32_t w, double weight) {
+    if (index[v] < 0) return;
+    entries.emplace_back(index[v], index[v], weight);
+    if (index[w] >= 0)
+      entries.emplace_back(index[v], index[w], -weight);
+    else
+      system.right.row(index[v]) += weight * boundary.places[w].transpose();
+  };
+  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t d = (c + 1) % 3;
+      add(disk.faces()[f][c], disk.faces()[f][d], half(disk, f, c, d));
+      add(disk.faces()[f][d], disk.faces()[f][c], half(disk, f, d, c));
+    }
+  system.matrix.resize(n, n);
+  system.matrix.setFromTriplets(entries.begin(), entries.end());
+  return system;
+}
+
+template <class Solver>
+bool solve_with(Solver&& solver, const MapSystem& system, SquareMap& map) {
+  solver.compute(system.matrix);
+  if (solver.info() != Eigen::Success) return false;
+  const Eigen::MatrixX2d places = solver.solve(system.right);
+  if (!places.allFinite()) return false;
+  for (std::size_t i = 0; i < system.inner.size(); ++i) map[system.inner[i]] = places.row(static_cast<Eigen::Index>(i));
+  return true;
+}
+
+bool solve_symmetric(const MapSystem& system, SquareMap& map) {
+  if (system.matrix.rows() == 0) return true;
+  if (system.matrix.rows() < kSmallSystem)
+    return solve_with(Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>>(), system, map);
+  return solve_with(Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::MetisOrdering<int>>(), system, map);
+}
+
+bool solve_general(const MapSystem& system, SquareMap& map) {
+  if (system.matrix.rows() == 0) return true;
+  return solve_with(Eigen::SparseLU<Sparse, Eigen::COLAMDOrdering<int>>(), system, map);
+}
+
+}  // namespace
+
+std::size_t count_flipped(const Disk& disk, const SquareMap& map) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      disk.faces(), [&](const Triangle& f) { return orientation(map[f[0]], map[f[1]], map[f[2]]) <= 0; }));
+}
+
+std::optional<SquareMap> map_to_square(CutDisk& cut) {
+  if (cut.outer.size() < 4) return std::nullopt;
+  SquareBoundary boundary = place_boundary(cut);
+  split_chords(cut.disk, boundary);
+  SquareMap map = boundary.places;
+  if (solve_symmetric(assemble(cut.disk, boundary, cotan_half), map) && count_flipped(cut.disk, map) == 0) return map;
+  map = boundary.places;
+  if (solve_general(assemble(cut.disk, boundary, mean_value_half), map) && count_flipped(cut.disk, map) == 0)
+    return map;
+  return std::nullopt;
+}
+
+}  // namespace hilbrush
