@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "planner/cell_description.h"
+#include "sampling/sample_options.h"
 #include "sampling/tone.h"
 
 /// From a grey wedge to a tone curve (README, "Tone"). The wedge is a flat strip of 11 or more steps; each is painted
@@ -17,8 +18,15 @@ struct WedgeStep {
 /// Paints and reads the steps of a wedge; the simulated one is wedge_on_film(), a real one is measured by hand.
 using Wedge = std::function<std::vector<WedgeStep>(const std::vector<double>& asked)>;
 
-/// Inverts the wedge's response: for 11 wanted tones (0, .1 .. 1) the coverage to ask for, at most asked_max. Repeats
-/// with refined steps.
+/// The wedge of the simulated film: each step is a field of flat surface on which `options` place dots at this pitch
+/// (whose own pitch and count are ignored), exposed at normal incidence and read without its border. Keeps a reference
+/// to `cell`.
+Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOptions& options);
+
+/// Inverts the wedge's response: for the wanted tones 0, .1 .. .9, 1 and, where the paint's response bends most, .05,
+/// .95 and .98 the coverage to ask for, at most asked_max. Paints up to six wedges, each asking for what the ones
+/// before suggest, until every step that can be reached reads within .003 of what is wanted.
+/// @throws InputError if the wedge's readings do not rise with what was asked.
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max);
 
 }  // namespace hilbrush

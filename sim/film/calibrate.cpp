@@ -1,0 +1,154 @@
+#include "sim/film/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sampling/input_error.h"
+#include "sampling/sample.h"
+#include "sampling/tone_field.h"
+#include "sim/film/film.h"
+
+namespace hilbrush {
+
+namespace {
+
+/// Sides of a field in pitches: neither square nor powers of two, where dots along a Hilbert curve fall into exact
+/// grids that no object shows.
+constexpr double kFieldWidth = 137, kFieldHeight = 91;
+/// What is not read along the border, in pitches: light is lost over the edge.
+constexpr double kFieldBorder = 4;
+
+/// A flat black field, whose tone curve then asks for whatever coverage a step needs.
+TexturedMesh black_field(double width_m, double height_m) {
+  TexturedMesh field;
+  field.vertices = {{0, 0, 0}, {width_m, 0, 0}, {width_m, height_m, 0}, {0, height_m, 0}};
+  field.triangles = {{0, 1, 2}, {0, 2, 3}};
+  field.corner_uv.resize(2, {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
+  field.corner_luminance.resize(2, {0.f, 0.f, 0.f});
+  field.material_index = {0, 0};
+  field.materials = {{.name = "black", .source = ColorSource::kColors}};
+  return field;
+}
+
+SurfacePoint surface_point(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O) {
+  const Eigen::Vector3d area = mesh.area_vector(triangle);
+  const auto share = [&](int c) {
+    const Eigen::Vector3d& from = mesh.corner(triangle, (c + 1) % 3);
+    return .5 * (mesh.corner(triangle, (c + 2) % 3) - from).cross(p_O - from).dot(area) / area.squaredNorm();
+  };
+  const double u = share(0), v = share(1);
+  return {triangle, {u, v, 1 - u - v}};
+}
+
+/// Mean coverage of the field but for its border, by an even lattice of places a third of a pitch apart.
+double read_field(const Film& film, double width_m, double height_m) {
+  const double border_m = kFieldBorder * film.pitch_m(), step_m = film.pitch_m() / 3;
+  double sum = 0;
+  long count = 0;
+  for (double y = border_m; y <= height_m - border_m; y += step_m)
+    for (double x = border_m; x <= width_m - border_m; x += step_m) {
+      const double u = x / width_m, v = y / height_m;
+      sum += u >= v ? film.painted({0, {1 - u, u - v, v}}) : film.painted({1, {1 - v, u, v - u}});
+      ++count;
+    }
+  return sum / static_cast<double>(count);
+}
+
+double paint_step(const CellDescription& cell, double pitch_m, SampleOptions options, const TexturedMesh& field,
+                  const SurfaceCurve& curve, double asked) {
+  ToneOptions tone_options;
+  tone_options.untextured = Untextured::kMaterial;
+  tone_options.curve = {{0, 1}, {0, asked}};
+  const ToneField tone(field, tone_options);
+  options.pitch_m = pitch_m;
+  options.dot_count.reset();
+  const DotSequence dots = place_dots(curve, tone, options);
+  std::vector<SurfacePoint> points;
+  std::vector<float> levels;
+  for (const Dot& dot : dots.dots) {
+    points.push_back(surface_point(field, dot.triangle, dot.position_O));
+    levels.push_back(dot.level);
+  }
+  Film film(field, cell, pitch_m);
+  film.expose_at(points, levels);
+  return read_field(film, kFieldWidth * pitch_m, kFieldHeight * pitch_m);
+}
+
+/// Readings in rising order of what was asked; a reading that falls (by the grain of the dots) takes the mean with its
+/// neighbours.
+std::vector<WedgeStep> monotone(std::vector<WedgeStep> steps) {
+  std::sort(steps.begin(), steps.end(), [](const WedgeStep& a, const WedgeStep& b) { return a.asked < b.asked; });
+  // Pool adjacent violators: blocks of equal mean until the means rise.
+  struct Block {
+    double sum = 0;
+    std::size_t count = 0;
+    double mean() const { return sum / static_cast<double>(count); }
+  };
+  std::vector<Block> blocks;
+  for (const WedgeStep& step : steps) {
+    blocks.push_back({step.painted, 1});
+    while (blocks.size() > 1 && blocks[blocks.size() - 2].mean() > blocks.back().mean()) {
+      const Block last = blocks.back();
+      blocks.pop_back();
+      blocks.back().sum += last.sum, blocks.back().count += last.count;
+    }
+  }
+  auto step = steps.begin();
+  for (const Block& block : blocks)
+    for (std::size_t i = 0; i < block.count; ++i) (step++)->painted = block.mean();
+  return steps;
+}
+
+/// What to ask for so that `wanted` is read, by linear interpolation between the readings; at most asked_max.
+double asked_for(const std::vector<WedgeStep>& steps, double wanted, double asked_max) {
+  const auto above =
+      std::find_if(steps.begin(), steps.end(), [&](const WedgeStep& step) { return step.painted >= wanted; });
+  if (above == steps.end()) return asked_max;
+  if (above == steps.begin()) return above->asked;
+  const auto below = above - 1;
+  const double share = (wanted - below->painted) / (above->painted - below->painted);
+  return std::min(asked_max, below->asked + share * (above->asked - below->asked));
+}
+
+}  // namespace
+
+Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOptions& options) {
+  return [&cell, pitch_m, options](const std::vector<double>& asked) {
+    const TexturedMesh field = black_field(kFieldWidth * pitch_m, kFieldHeight * pitch_m);
+    const SurfaceCurve curve(field);
+    std::vector<WedgeStep> steps;
+    for (const double coverage : asked)
+      steps.push_back({coverage, coverage > 0 ? paint_step(cell, pitch_m, options, field, curve, coverage) : 0.});
+    return steps;
+  };
+}
+
+ToneCurve calibrate_tone(const Wedge& wedge, double asked_max) {
+  constexpr int kWedgesMax = 6;
+  constexpr double kTolerance = .003;
+  const std::vector<double> wanted{0, .05, .1, .2, .3, .4, .5, .6, .7, .8, .9, .95, .98, 1};
+  std::vector<double> asked;
+  for (const double tone : wanted) asked.push_back(tone * asked_max);
+
+  std::vector<WedgeStep> readings{{0, 0}};
+  for (int round = 0; round < kWedgesMax; ++round) {
+    const std::vector<WedgeStep> steps = wedge(asked);
+    if (steps.size() != asked.size())
+      throw InputError("", "the wedge has " + std::to_string(steps.size()) + " readings, not one a step");
+    double worst = 0;
+    for (std::size_t i = 1; i < steps.size(); ++i) {
+      const bool is_at_limit = steps[i].painted < wanted[i] && asked[i] >= asked_max;
+      if (!is_at_limit) worst = std::max(worst, std::abs(steps[i].painted - wanted[i]));
+    }
+    if (round > 0 && worst <= kTolerance) break;
+    readings.insert(readings.end(), steps.begin() + 1, steps.end());
+    readings = monotone(readings);
+    if (!(readings.back().painted > 0)) throw InputError("", "the wedge reads no paint at all, whatever was asked");
+    for (std::size_t i = 1; i < wanted.size(); ++i)
+      asked[i] = std::max(asked[i - 1], asked_for(readings, wanted[i], asked_max));
+  }
+  asked.back() = std::max(asked.back(), asked[asked.size() - 2]);
+  return {wanted, asked};
+}
+
+}  // namespace hilbrush
