@@ -156,7 +156,7 @@ fs::path cells_folder() {
   std::error_code error;
   if (const char* folder = std::getenv("HILBRUSH_CELLS"); folder != nullptr && *folder != '\0') return folder;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path installed = program.parent_path().parent_path() / "share" / "hilbrush" / "cells";
+  fs::path installed = program.parent_path().parent_path() / "share" / "hilbrush" / "cells";
   if (!error && fs::is_directory(installed, error)) return installed;
   return HILBRUSH_SOURCE_CELLS;
 }
@@ -217,7 +217,7 @@ fs::path find_cell(const std::string& name) {
     if (!fs::is_regular_file(name, error)) throw InputError(name, "no such cell file");
     return name;
   }
-  const fs::path file = cells_folder() / (name + ".json");
+  fs::path file = cells_folder() / (name + ".json");
   if (name.empty() || !fs::is_regular_file(file, error)) {
     std::string known;
     for (const std::string& cell : known_cells()) known += (known.empty() ? "" : ", ") + cell;

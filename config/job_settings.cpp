@@ -11,7 +11,7 @@ namespace hilbrush {
 namespace {
 
 constexpr double kDefaultDpi = 100;
-constexpr double kInch_m = 0.0254;
+constexpr double kMetresPerInch = 0.0254;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kDotsMax = 50'000'000;
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
@@ -102,7 +102,7 @@ const char* untextured_name(Untextured untextured) {
 SampleOptions sample_options(const JobSettings& settings) {
   SampleOptions options;
   options.dot_count = settings.dots;
-  if (!settings.dots) options.pitch_m = kInch_m / settings.dpi.value_or(kDefaultDpi);
+  if (!settings.dots) options.pitch_m = kMetresPerInch / settings.dpi.value_or(kDefaultDpi);
   options.sampler = settings.sampler;
   options.seed = settings.seed;
   options.dot_limit = kDotsMax;

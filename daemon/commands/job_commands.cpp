@@ -114,7 +114,7 @@ Declared declare(CLI::App& app, CommandContext& context, const char* name, const
 
 Declared declare_with_id(CLI::App& app, CommandContext& context, const char* name, const char* description,
                          Action action) {
-  const Declared declared = declare(app, context, name, description, std::move(action));
+  Declared declared = declare(app, context, name, description, std::move(action));
   declared.app->add_option("ID", declared.flags->id, "the job's number, see `hilbrush list`")->required();
   return declared;
 }
