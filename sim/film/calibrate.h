@@ -26,7 +26,7 @@ Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOpt
 /// Inverts the wedge's response: for the wanted tones 0, .1 .. .9, 1 and, where the paint's response bends most, .05,
 /// .95 and .98 the coverage to ask for, at most asked_max. Paints up to six wedges, each asking for what the ones
 /// before suggest, until every step that can be reached reads within .003 of what is wanted.
-/// @throws InputError if the wedge's readings do not rise with what was asked.
+/// @throws InputError if the wedge has too few readings or shows no paint at all.
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max);
 
 }  // namespace hilbrush

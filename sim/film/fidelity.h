@@ -20,9 +20,14 @@ struct Fidelity {
   double unreachable_share = 0;  ///< of the area
 };
 
-/// Whether the surface at a point can be exposed at all (the planner's Reach, passed in by whoever has it).
+/// Whether the surface at a point can be exposed at all (the planner's Reach, passed in by whoever has it). Called from
+/// several threads at a time; empty: all of it can.
 using ReachTest = std::function<bool(const SurfacePoint&)>;
 
+/// At 20,000 points, one in each of as many strata of equal area, and in six views at 3 pixels a pitch (fewer if a view
+/// would exceed some 24 million pixels). Figures of nothing (no surface, none reachable) are 0; of no difference at all
+/// 99 dB. Same seed, same figures, for any number of threads. Cost: CPU seconds 1.5 for 80 mm at 100 dpi, 5 at 300 dpi;
+/// half of them for the views.
 Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTest& is_reachable, std::uint64_t seed,
                           const Progress& progress = {});
 
