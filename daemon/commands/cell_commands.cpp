@@ -1,4 +1,6 @@
 #include <CLI/CLI.hpp>
+#include <array>
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <ostream>
 
@@ -12,37 +14,47 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-int ask_daemon(const CommandContext& context, const std::string& method) {
+/// Clearing, arming and homing are answered when they are done: a laser's start delay and a slow axis have to fit.
+constexpr auto kMotionTimeout = std::chrono::seconds(120);
+constexpr auto kAnswerTimeout = std::chrono::seconds(10);
+
+struct CellCommand {
+  const char *name, *method, *description;
+  std::chrono::seconds timeout;
+};
+
+int ask_daemon(const CommandContext& context, const CellCommand& command) {
   RpcClient client(context.socket_path);
-  const Json result = client.call(method, Json());
+  const Json result = client.call(command.method, Json(), command.timeout);
+  const std::string method = command.method;
   if (context.is_json)
     context.terminal.out << result.dump() << std::endl;
-  else if (const Json& cell = member(result, "cell"); cell.is_object() && method.starts_with("cell."))
-    context.terminal.out << format_cell(cell) << std::flush;
+  else if (method == "system.info")
+    context.terminal.out << format_fields(member(result, "system").is_object() ? member(result, "system") : result)
+                         << std::flush;
+  else if (method == "cell.status")
+    context.terminal.out << format_cell(member(result, "cell")) << std::flush;
   else
-    context.terminal.out << format_fields(result) << std::flush;
+    context.terminal.out << format_cell_line(member(result, "cell")) << std::endl;
   return kExitOk;
 }
 
 }  // namespace
 
 void add_cell_commands(CLI::App& app, CommandContext& context) {
-  struct Command {
-    const char *name, *method, *description;
+  static constexpr std::array kCommands{
+      CellCommand{"status", "cell.status", "say what the cell is doing", kAnswerTimeout},
+      CellCommand{"stop", "cell.stop", "turn the laser off and stop all motion, now; latches until clear",
+                  kAnswerTimeout},
+      CellCommand{"clear", "cell.clear", "release a stop or a fault, once its cause is gone", kMotionTimeout},
+      CellCommand{"arm", "cell.arm", "make the cell ready to paint: devices enabled, laser armed", kMotionTimeout},
+      CellCommand{"home", "cell.home", "move all axes to their home positions, laser off", kMotionTimeout},
+      CellCommand{"info", "system.info", "say which daemon answers: version, cell, folders, limits", kAnswerTimeout},
   };
-  constexpr Command kCommands[] = {
-      {"status", "cell.status", "say what the cell is doing"},
-      {"stop", "cell.stop", "turn the laser off and stop all motion, now; latches until clear"},
-      {"clear", "cell.clear", "release a stop or a fault, once its cause is gone"},
-      {"arm", "cell.arm", "make the cell ready to paint: devices enabled, laser armed"},
-      {"home", "cell.home", "move all axes to their home positions"},
-      {"info", "system.info", "say which daemon answers: version, cell, state folder"},
-  };
-  for (const Command& entry : kCommands) {
+  for (const CellCommand& entry : kCommands) {
     CLI::App* command = add_daemon_command(app, context, entry.name, entry.description);
-    command->callback([&context, method = std::string(entry.method)] {
-      context.action = [&context, method] { return ask_daemon(context, method); };
-    });
+    command->callback(
+        [&context, &entry] { context.action = [&context, &entry] { return ask_daemon(context, entry); }; });
   }
 }
 

@@ -129,6 +129,17 @@ std::string joints_text(const Json& joints) {
   return text;
 }
 
+/// "robot ready, table ready, laser fault (interlock open)".
+std::string devices_text(const Json& devices) {
+  std::string text;
+  for (const auto& [device, value] : devices.items()) {
+    text += (text.empty() ? "" : ", ") + device + " " +
+            (value.is_object() ? text_field(value, "state", "?") : value_text(value));
+    if (const Json& fault = member(value, "fault"); !fault.is_null()) text += " (" + value_text(fault) + ")";
+  }
+  return text;
+}
+
 void add_fields(const Json& object, const std::string& prefix, std::string& text) {
   for (const auto& [key, value] : object.items()) {
     if (value.is_object() && !value.empty())
@@ -274,19 +285,29 @@ std::string format_job_table(const Json& jobs) {
   return text;
 }
 
+std::string format_cell_line(const Json& cell) {
+  std::string text = "cell: " + text_field(cell, "state", "?") + ", laser " + text_field(cell, "laser", "?");
+  for (const char* key : {"reason", "fault"})
+    if (const Json& why = member(cell, key); !why.is_null()) text += ", " + value_text(why);
+  return text;
+}
+
 std::string format_cell(const Json& cell) {
-  std::string text = line("cell", text_field(cell, "state", "?")) + line("laser", text_field(cell, "laser", "?"));
+  std::string text = line("cell", text_field(cell, "state", "?"));
+  if (const Json& reason = member(cell, "reason"); !reason.is_null()) text += line("reason", value_text(reason));
   if (const Json& fault = member(cell, "fault"); !fault.is_null()) text += line("fault", value_text(fault));
+  text += line("laser", text_field(cell, "laser", "?"));
+  if (const Json& interlock = member(cell, "interlock"); !interlock.is_null())
+    text += line("interlock", value_text(interlock));
   if (const Json& job = member(cell, "job"); !job.is_null()) text += line("job", value_text(job));
   if (const Json& devices = member(cell, "devices"); devices.is_object())
-    for (const auto& [device, state] : devices.items()) text += line(device, value_text(state));
+    text += line("devices", devices_text(devices));
   if (const Json& joints = member(cell, "joints"); !joints.is_null()) text += line("joints", joints_text(joints));
-  static constexpr std::array kShown{"state", "laser", "fault", "job", "devices", "joints"};
+  static constexpr std::array kShown{"state", "laser", "fault", "job", "devices", "joints", "reason", "interlock"};
   for (const auto& [key, value] : cell.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
-    if (!is_shown && !value.is_null() && !(value.is_structured() && value.empty()))
-      text += line(reason_text(key), value_text(value));
+    if (!is_shown && !value.is_null()) text += line(reason_text(key), value_text(value));
   }
   return text;
 }

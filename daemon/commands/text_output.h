@@ -26,6 +26,8 @@ std::string format_job(const nlohmann::ordered_json& job);
 /// A table, one job a line, under a heading.
 std::string format_job_table(const nlohmann::ordered_json& jobs);
 
+/// One line: state, laser, reason.
+std::string format_cell_line(const nlohmann::ordered_json& cell);
 /// State of the cell, its laser, devices, joints and fault.
 std::string format_cell(const nlohmann::ordered_json& cell);
 

@@ -1,4 +1,6 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -119,12 +121,16 @@ TEST(JobCommands, RefusalsBecomeExitCodes) {
   }
 }
 
-TEST(CellCommands, StatusIsText) {
-  AnsweringDaemon daemon(
-      R"("result":{"cell":{"state":"stopped","laser":"off","devices":{"robot":"ready"},"joints":null,"job":null,"fault":null}})");
+TEST(CellCommands, StatusIsTextActsAreALine) {
+  const std::string cell =
+      R"("result":{"cell":{"state":"stopped","laser":"off","devices":{"robot":{"state":"ready","fault":null}},"joints":null,"job":null,"reason":"stopped by user 0"}})";
+  AnsweringDaemon daemon(cell);
   EXPECT_EQ(run_with(daemon, {"status"}).out,
-            "  cell:          stopped\n  laser:         off\n  robot:         ready\n");
-  AnsweringDaemon info(R"("result":{"version":"0.1.0","cell":{"name":"default"}})");
+            "  cell:          stopped\n  reason:        stopped by user 0\n  laser:         off\n  devices:       "
+            "robot ready\n");
+  AnsweringDaemon stopped(cell);
+  EXPECT_EQ(run_with(stopped, {"stop"}).out, "cell: stopped, laser off, stopped by user 0\n");
+  AnsweringDaemon info(R"("result":{"system":{"version":"0.1.0","cell":{"name":"default"}}})");
   EXPECT_EQ(run_with(info, {"info"}).out, "version: 0.1.0\ncell.name: default\n");
 }
 
@@ -203,6 +209,22 @@ TEST(Watch, ALostDaemonIsFour) {
   const CommandRun run = watch(telling({job("painting", .5)}, true));
   EXPECT_EQ(run.exit_code, kExitNoDaemon);
   EXPECT_EQ(run.err, "hilbrush: the daemon closed the connection\n");
+}
+
+TEST(Watch, CtrlCEndsWatchingAndSaysThatTheJobGoesOn) {
+  sigset_t set, before;  // blocked in the threads made here, so that it can never end the test itself
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &set, &before);
+  const CommandRun run = watch([](Peer& peer) {
+    peer.read_line();
+    peer.write_line(R"({"jsonrpc":"2.0","id":1,"result":{"seq":1,"job":)" + job("painting", .5) + "}}");
+    kill(getpid(), SIGINT);
+    peer.wait_for_close();
+  });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  EXPECT_EQ(run.exit_code, kExitInterrupted);
+  EXPECT_EQ(run.err, "hilbrush: no longer watching; the job goes on\n");
 }
 
 TEST(Watch, UpdatesOfOtherJobsAreNotMine) {

@@ -98,14 +98,18 @@ TEST(TextOutput, JobsAreATable) {
 }
 
 TEST(TextOutput, CellShowsStateFaultDevicesAndJoints) {
-  EXPECT_EQ(
-      format_cell(Json::parse(
-          R"({"state":"fault","laser":"off","devices":{"robot":"ready"},"joints":{"j1_deg":1.25,"j3_mm":290},"job":null,"fault":"interlock open"})")),
-      "  cell:          fault\n"
-      "  laser:         off\n"
-      "  fault:         interlock open\n"
-      "  robot:         ready\n"
-      "  joints:        j1_deg 1.25  j3_mm 290.00\n");
+  const Json cell = Json::parse(
+      R"({"state":"stopped","laser":"off","interlock":"open","devices":{"robot":{"state":"ready","fault":null},"laser":{"state":"fault","fault":"interlock open"}},
+          "joints":{"j1_deg":1.25,"j3_mm":290},"job":null,"fault":"interlock open","time_scale":0})");
+  EXPECT_EQ(format_cell(cell),
+            "  cell:          stopped\n"
+            "  fault:         interlock open\n"
+            "  laser:         off\n"
+            "  interlock:     open\n"
+            "  devices:       robot ready, laser fault (interlock open)\n"
+            "  joints:        j1_deg 1.25  j3_mm 290.00\n"
+            "  time scale:    0\n");
+  EXPECT_EQ(format_cell_line(cell), "cell: stopped, laser off, interlock open");
 }
 
 TEST(TextOutput, NoTextCanSteerTheTerminal) {
@@ -147,6 +151,7 @@ TEST(TextOutput, AnswersOfAnotherShapeNeverThrow) {
     EXPECT_NO_THROW(format_job_line(json));
     EXPECT_NO_THROW(format_job_table(Json::array({json})));
     EXPECT_NO_THROW(format_cell(json));
+    EXPECT_NO_THROW(format_cell_line(json));
     EXPECT_NO_THROW(format_fields(json));
   }
 }
