@@ -89,6 +89,15 @@ std::optional<std::string> read_bytes(const path& file, std::size_t limit, std::
   return bytes;
 }
 
+/// OpenImageIO paints a GIF's whole canvas before anyone can ask for its size.
+std::size_t gif_pixels(std::string_view bytes) {
+  const auto number = [&](std::size_t at) {
+    return std::size_t{static_cast<unsigned char>(bytes[at])} +
+           256 * std::size_t{static_cast<unsigned char>(bytes[at + 1])};
+  };
+  return bytes.size() < 10 ? 0 : number(6) * number(8);
+}
+
 /// What is wrong with the header, or empty.
 std::string header_fault(const OIIO::ImageSpec& spec, std::size_t pixel_limit) {
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1) return "it is not a flat picture";
@@ -180,7 +189,7 @@ std::string one_line(std::string text) {
 
 std::optional<Texture> load_image_file(const path& file, std::size_t pixel_limit, std::string& reason) {
   static std::once_flag limits_set;
-  std::call_once(limits_set, [] { OIIO::attribute("limits:imagesize_MB", 1024); });
+  std::call_once(limits_set, [] { OIIO::attribute("limits:imagesize_MB", 512); });
 
   // No useful picture has more than 16 bytes a pixel in its file, but small ones may carry metadata.
   const auto bytes =
@@ -193,6 +202,10 @@ std::optional<Texture> load_image_file(const path& file, std::size_t pixel_limit
   }
   if (format == "jpeg" && is_truncated_jpeg(*bytes)) {
     reason = "the JPEG picture is truncated";
+    return std::nullopt;
+  }
+  if (format == "gif" && gif_pixels(*bytes) > pixel_limit) {
+    reason = "it has more pixels than the limit allows (" + std::to_string(pixel_limit) + " left)";
     return std::nullopt;
   }
   try {

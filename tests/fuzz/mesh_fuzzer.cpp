@@ -1,0 +1,22 @@
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "sampling/images/image_file.h"
+#include "sampling/input_error.h"
+#include "sampling/model_file.h"
+#include "tests/fuzz/playground.h"
+
+/// libFuzzer: the formats that go through OpenMesh; the first byte picks one.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const hilbrush::Playground playground;
+  if (size == 0) return 0;
+  static const char* const kNames[] = {"input.obj", "input.ply", "input.off", "input.stl"};
+  const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
+  try {
+    hilbrush::load_model(playground.write(kNames[data[0] % 4], bytes), hilbrush::load_image_file);
+  } catch (const hilbrush::InputError&) {
+    // refused: fine
+  }
+  return 0;
+}
