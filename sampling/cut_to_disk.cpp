@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <queue>
 #include <utility>
 
@@ -66,9 +67,8 @@ Distances distances_from(std::uint32_t source, const Disk& disk, const Arcs& arc
   return d;
 }
 
-/// Cuts a closed surface of genus 0 open along its approximate diameter. Returns the side with which the boundary
-/// begins.
-TriangleSide cut_along_diameter(Disk& disk) {
+/// Cuts a closed surface of genus 0 open along its approximate diameter. Returns the vertex at one end.
+std::uint32_t cut_along_diameter(Disk& disk) {
   const Arcs arcs(disk);
   const std::uint32_t one_end = distances_from(0, disk, arcs).farthest();
   const Distances distances = distances_from(one_end, disk, arcs);
@@ -77,7 +77,7 @@ TriangleSide cut_along_diameter(Disk& disk) {
     path.push_back(distances.last_side[v]);
   for (const TriangleSide s : path) disk.cut_edge(s);
   disk.finish_cuts();
-  return path.back();
+  return disk.from(path.back());
 }
 
 double length_of(const Disk& disk, const BoundaryLoop& loop) {
@@ -86,51 +86,124 @@ double length_of(const Disk& disk, const BoundaryLoop& loop) {
   return sum;
 }
 
-void split_long_sides(Disk& disk, BoundaryLoop& loop) {
-  const double longest = kLongestBoundarySide * length_of(disk, loop);
-  BoundaryLoop result;
-  for (TriangleSide s : loop) {
-    // Each split leaves the first half as side s, and the second half as side 0 of the newest face.
-    std::vector<TriangleSide> parts{s};
-    for (std::size_t i = 0; i < parts.size();) {
-      if (disk.length(parts[i]) <= longest || parts.size() > 64) {
-        ++i;
-        continue;
-      }
-      disk.split_edge(parts[i]);
-      const TriangleSide second{static_cast<std::uint32_t>(disk.faces().size() - 1), 0};
-      parts.insert(parts.begin() + static_cast<std::ptrdiff_t>(i) + 1, second);
+/// The loop of a disk, beginning at a vertex.
+BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
+  BoundaryLoop loop = std::move(boundary_loops(disk.neighbours()).front());
+  const auto first = std::find_if(loop.begin(), loop.end(), [&](TriangleSide s) { return disk.from(s) == vertex; });
+  std::rotate(loop.begin(), first, loop.end());
+  return loop;
+}
+
+void split_long_sides(CutDisk& cut) {
+  const std::uint32_t start = cut.disk.from(cut.outer[0]);
+  const double longest = kLongestBoundarySide * length_of(cut.disk, cut.outer);
+  for (bool is_done = false; !is_done;) {
+    is_done = true;
+    std::vector<char> is_split(cut.disk.faces().size(), 0);
+    for (const TriangleSide s : cut.outer) {
+      // Splitting renumbers the other sides of the face, so each face is split once a round.
+      if (cut.disk.length(s) <= longest || std::exchange(is_split[s.triangle], 1)) continue;
+      cut.disk.split_edge(s);
+      is_done = false;
     }
-    result.insert(result.end(), parts.begin(), parts.end());
+    if (!is_done) cut.outer = loop_from(cut.disk, start);
   }
-  loop = std::move(result);
+}
+
+/// Cuts along each closing edge and the paths from both its ends to the root of the tree, but for the stem that all
+/// loops share.
+std::uint32_t cut_loops(Disk& disk, const Distances& distances, const std::vector<TriangleSide>& closing) {
+  std::vector<char> is_cut_vertex(disk.positions().size(), 0);
+  std::vector<TriangleSide> cut = closing;
+  for (const TriangleSide side : closing)
+    for (std::uint32_t v : {disk.from(side), disk.to(side)})
+      for (; !is_cut_vertex[v] && distances.last_side[v] != kNoSide; v = disk.from(distances.last_side[v])) {
+        is_cut_vertex[v] = 1;
+        cut.push_back(distances.last_side[v]);
+      }
+  std::vector<int> degree(disk.positions().size(), 0);
+  for (const TriangleSide side : cut) ++degree[disk.from(side)], ++degree[disk.to(side)];
+  // Only the root can be a loose end; take its stem away edge by edge.
+  for (bool is_loose = true; is_loose;) {
+    const auto loose = std::find_if(cut.begin(), cut.end(), [&](TriangleSide side) {
+      return degree[disk.from(side)] == 1 || degree[disk.to(side)] == 1;
+    });
+    is_loose = loose != cut.end();
+    if (!is_loose) break;
+    --degree[disk.from(*loose)], --degree[disk.to(*loose)];
+    cut.erase(loose);
+  }
+  for (const TriangleSide side : cut) disk.cut_edge(side);
+  disk.finish_cuts();
+  return disk.from(cut.front());
+}
+
+/// Cuts a closed surface with handles open along the shortest loops through one vertex that leave no handle (Erickson
+/// and Whittlesey, "Greedy optimal homotopy and homology generators", 2005): a tree of shortest paths, a tree of faces
+/// across other edges, longest loops first; each edge that neither tree has closes a loop. Returns a vertex on the cut.
+std::uint32_t cut_handles(Disk& disk) {
+  const Distances distances = distances_from(0, disk, Arcs(disk));
+  struct Candidate {
+    double loop_length;
+    TriangleSide side;
+  };
+  std::vector<Candidate> candidates;
+  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
+    for (std::uint8_t s = 0; s < 3; ++s) {
+      const TriangleSide side{f, s}, across = disk.neighbours()[f][s];
+      if (across.triangle < f || (across.triangle == f && across.side < s)) continue;
+      const TriangleSide to_from = distances.last_side[disk.from(side)], to_to = distances.last_side[disk.to(side)];
+      if (to_from == side || to_from == across || to_to == side || to_to == across) continue;
+      candidates.push_back(
+          {distances.to_vertex[disk.from(side)] + distances.to_vertex[disk.to(side)] + disk.length(side), side});
+    }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.loop_length > b.loop_length; });
+  std::vector<std::uint32_t> parent(disk.faces().size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto find = [&](std::uint32_t f) {
+    while (parent[f] != f) f = parent[f] = parent[parent[f]];
+    return f;
+  };
+  std::vector<TriangleSide> cut;
+  for (const Candidate& candidate : candidates) {
+    const std::uint32_t a = find(candidate.side.triangle);
+    const std::uint32_t b = find(disk.neighbours()[candidate.side.triangle][candidate.side.side].triangle);
+    if (a != b)
+      parent[a] = b;
+    else
+      cut.push_back(candidate.side);
+  }
+  return cut_loops(disk, distances, cut);
 }
 
 }  // namespace
 
 std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
                                    std::string& reason) {
-  if (component.genus != 0) {
-    reason = component.genus < 0
-                 ? "its triangles do not form a surface"
-                 : "it has " + std::to_string(component.genus) + (component.genus == 1 ? " handle" : " handles");
+  if (component.genus < 0) {
+    reason = "its triangles do not form a surface";
     return std::nullopt;
   }
-  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0};
-  if (cut.is_cut) {
-    const TriangleSide start = cut_along_diameter(cut.disk);
-    cut.outer = std::move(boundary_loops(cut.disk.neighbours()).front());
-    std::rotate(cut.outer.begin(), std::find(cut.outer.begin(), cut.outer.end(), start), cut.outer.end());
-  } else {
-    std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbours());
-    const auto outer = std::max_element(loops.begin(), loops.end(), [&](const BoundaryLoop& a, const BoundaryLoop& b) {
-      return length_of(cut.disk, a) < length_of(cut.disk, b);
-    });
-    std::iter_swap(loops.begin(), outer);
-    for (std::size_t i = 1; i < loops.size(); ++i) cut.disk.fill(loops[i]);
-    cut.outer = std::move(loops.front());
+  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0 || component.genus > 0};
+  std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbours());
+  if (!cut.is_cut) {
+    const auto longest = std::max_element(
+        loops.begin(), loops.end(),
+        [&](const BoundaryLoop& a, const BoundaryLoop& b) { return length_of(cut.disk, a) < length_of(cut.disk, b); });
+    cut.outer = *longest;
+    loops.erase(longest);
   }
-  split_long_sides(cut.disk, cut.outer);
+  for (const BoundaryLoop& loop : loops) cut.disk.fill(loop);
+  if (cut.is_cut) {
+    const std::uint32_t start = component.genus > 0 ? cut_handles(cut.disk) : cut_along_diameter(cut.disk);
+    if (boundary_loops(cut.disk.neighbours()).size() != 1) {
+      reason = "no cut was found that makes it a disk";
+      return std::nullopt;
+    }
+    cut.outer = loop_from(cut.disk, start);
+  }
+  split_long_sides(cut);
   return cut;
 }
 

@@ -15,8 +15,9 @@ struct CutDisk {
 };
 
 /// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter; more branches
-/// shear the map and lengthen the curve). With boundaries: the longest loop is the outer one, the others are filled.
-/// Returns nothing, and a reason, for what has handles or is not a manifold.
+/// shear the map and lengthen the curve). Handles: all boundaries are filled, then short loops through one vertex are
+/// cut. With boundaries: the longest loop is the outer one, the others are filled. Returns nothing, and a reason, for
+/// what is not a manifold. Cost O(n log n).
 std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
                                    std::string& reason);
 

@@ -7,7 +7,10 @@ namespace hilbrush {
 namespace {
 
 constexpr std::size_t kMostFaces = 8;
-/// Around a vertex with many triangles division never ends by itself.
+/// A quad with no more than a small share of a mean triangle's area may hold as many: around a vertex with many
+/// triangles, and along needles, division would not end by itself.
+constexpr std::size_t kMostFacesIfSmall = 64;
+constexpr double kSmallShare = .25;
 constexpr int kDeepest = 24;
 /// Chaining by nearest ends is quadratic.
 constexpr std::size_t kMostChained = 3000;
@@ -20,10 +23,21 @@ Piece whole(const SheetFace& face, std::uint32_t index) {
 }
 
 /// While the base tree is built, Piece::triangle is the face's index.
+bool is_base_leaf(const Sheet& sheet, const TexturedMesh& mesh, double small_area, int depth,
+                  const std::vector<Piece>& pieces) {
+  if (pieces.size() <= kMostFaces || depth == kDeepest) return true;
+  if (pieces.size() > kMostFacesIfSmall) return false;
+  double area = 0;
+  for (const Piece& piece : pieces)
+    area += 2 * area_b(piece) * mesh.area_vector(sheet.faces[piece.triangle].triangle).norm();
+  return area < small_area;
+}
+
 template <class Hilbert>
-void divide(Sheet& sheet, const Box& box, Hilbert hilbert, int depth, std::vector<Piece>& pieces) {
+void divide(Sheet& sheet, const TexturedMesh& mesh, double small_area, const Box& box, Hilbert hilbert, int depth,
+            std::vector<Piece>& pieces) {
   if (pieces.empty()) return;
-  if (pieces.size() <= kMostFaces || depth == kDeepest) {
+  if (is_base_leaf(sheet, mesh, small_area, depth, pieces)) {
     BaseQuad quad{
         box, {}, {}, static_cast<std::uint32_t>(sheet.face_lists.size()), static_cast<std::uint32_t>(pieces.size())};
     if constexpr (Hilbert::kChildCount == 4)
@@ -38,7 +52,7 @@ void divide(Sheet& sheet, const Box& box, Hilbert hilbert, int depth, std::vecto
   std::vector<Piece>().swap(pieces);
   for (unsigned i = 0; i < Hilbert::kChildCount; ++i) {
     const unsigned place = hilbert.place(i);
-    divide(sheet, box.child(place), hilbert.child(i), depth + 1, children[place]);
+    divide(sheet, mesh, small_area, box.child(place), hilbert.child(i), depth + 1, children[place]);
   }
 }
 
@@ -88,10 +102,14 @@ void build_base_tree(Sheet& sheet, const TexturedMesh& mesh) {
   std::vector<Piece> pieces;
   pieces.reserve(sheet.faces.size());
   for (std::uint32_t f = 0; f < sheet.faces.size(); ++f) pieces.push_back(whole(sheet.faces[f], f));
+  double area = 0;
+  for (const Piece& piece : pieces)
+    area += 2 * area_b(piece) * mesh.area_vector(sheet.faces[piece.triangle].triangle).norm();
+  const double small_area = kSmallShare * area / static_cast<double>(std::max<std::size_t>(1, pieces.size()));
   if (sheet.is_on_square)
-    divide(sheet, Box{}, HilbertQuad{}, 0, pieces);
+    divide(sheet, mesh, small_area, Box{}, HilbertQuad{}, 0, pieces);
   else
-    divide(sheet, bounding_cube(sheet), HilbertCube{}, 0, pieces);
+    divide(sheet, mesh, small_area, bounding_cube(sheet), HilbertCube{}, 0, pieces);
   if (sheet.base_quads.empty()) return;
   sheet.begin_O = position_of_first_piece(sheet, sheet.base_quads.front(), mesh);
   sheet.end_O = position_of_first_piece(sheet, sheet.base_quads.back(), mesh);

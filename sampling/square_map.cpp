@@ -1,9 +1,10 @@
 #include "sampling/square_map.h"
 
-#include <iostream>  // Eigen/MetisSupport forgets it
-
-
+// clang-format off
+#include <iostream>  // Eigen/MetisSupport prints, but does not say so
 #include <Eigen/MetisSupport>
+// clang-format on
+
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
@@ -117,8 +118,8 @@ SquareBoundary place_boundary(const CutDisk& cut) {
 /// An inner edge between two vertices on one side of the square would be mapped onto that side, with all that it cuts
 /// off.
 void split_chords(Disk& disk, SquareBoundary& boundary) {
-  const auto face_count = static_cast<std::uint32_t>(disk.faces().size());
-  for (std::uint32_t f = 0; f < face_count; ++f)
+  // The faces that splitting adds are looked at in their turn: they take over sides of the old ones.
+  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s) {
       const TriangleSide side{f, s};
       if (disk.neighbours()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
