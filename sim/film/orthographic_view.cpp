@@ -60,6 +60,8 @@ void OrthographicView::fill(std::uint32_t triangle) {
   const double x_min = std::min({a.x(), b.x(), c.x()}), x_max = std::max({a.x(), b.x(), c.x()});
   const int first_row = std::max(0, static_cast<int>(std::ceil(std::min({a.y(), b.y(), c.y()}) - .5)));
   const int last_row = std::min(height_ - 1, static_cast<int>(std::floor(std::max({a.y(), b.y(), c.y()}) - .5)));
+  // Along an outline a front and a back face meet at equal depth: the front, which carries the film, shall win.
+  const double behind_m = mesh_.area_vector(triangle).dot(forward_O_) < 0 ? 0 : .05 * pixel_m_;
   constexpr double kRounding = 1e-9;  // neighbours share their border's pixels rather than leave gaps
   for (int row = first_row; row <= last_row; ++row) {
     const Eigen::Vector3d at_left = coordinates.constant + (row + .5) * coordinates.dy;
@@ -76,7 +78,7 @@ void OrthographicView::fill(std::uint32_t triangle) {
     }
     const int first = std::max(0, static_cast<int>(std::ceil(low - .5))),
               last = std::min(width_ - 1, static_cast<int>(std::floor(high - .5)));
-    const double depth_start = depths.dot(at_left), depth_step = depths.dot(coordinates.dx);
+    const double depth_start = depths.dot(at_left) + behind_m, depth_step = depths.dot(coordinates.dx);
     for (int x = first; x <= last; ++x) {
       const auto depth = static_cast<float>(depth_start + (x + .5) * depth_step);
       const std::size_t pixel = static_cast<std::size_t>(row) * width_ + x;
