@@ -1,5 +1,6 @@
 #include "sampling/piece.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace hilbrush {
@@ -10,6 +11,14 @@ bool has_area(const Piece& piece) {
 }
 
 }  // namespace
+
+Piece& Piece::operator=(const Piece& other) {
+  if (this == &other) return *this;
+  triangle = other.triangle;
+  corner_count = other.corner_count;
+  std::copy_n(other.corners.begin(), corner_count, corners.begin());
+  return *this;
+}
 
 void Piece::add(const PieceCorner& corner) {
   // The cap is never met by a convex polygon; one that rounding has bent loses a corner on which nothing depends.

@@ -25,6 +25,12 @@ struct Piece {
   std::uint32_t corner_count = 0;
   std::array<PieceCorner, kMostCorners> corners;
 
+  Piece() = default;
+  ~Piece() = default;
+  /// Only the corners in use are copied: pieces are copied all the time and most have four.
+  Piece(const Piece& other) { *this = other; }
+  Piece& operator=(const Piece& other);
+
   std::span<const PieceCorner> all() const { return {corners.data(), corner_count}; }
   void add(const PieceCorner& corner);
 };

@@ -11,6 +11,8 @@ constexpr std::size_t kMostFaces = 8;
 /// triangles, and along needles, division would not end by itself.
 constexpr std::size_t kMostFacesIfSmall = 64;
 constexpr double kSmallShare = .25;
+/// The same holds where the children together would have this many times the triangles.
+constexpr double kTooManyInChildren = 1.9;
 constexpr int kDeepest = 24;
 /// Chaining by nearest ends is quadratic.
 constexpr std::size_t kMostChained = 3000;
@@ -34,21 +36,30 @@ bool is_base_leaf(const Sheet& sheet, const TexturedMesh& mesh, double small_are
 }
 
 template <class Hilbert>
+void add_base_quad(Sheet& sheet, const Box& box, Hilbert hilbert, const std::vector<Piece>& pieces) {
+  BaseQuad quad;
+  quad.box = box;
+  quad.first_face = static_cast<std::uint32_t>(sheet.face_lists.size());
+  quad.face_count = static_cast<std::uint32_t>(pieces.size());
+  if constexpr (Hilbert::kChildCount == 4)
+    quad.quad = hilbert;
+  else
+    quad.cube = hilbert;
+  for (const Piece& piece : pieces) sheet.face_lists.push_back(piece.triangle);
+  sheet.base_quads.push_back(quad);
+}
+
+template <class Hilbert>
 void divide(Sheet& sheet, const TexturedMesh& mesh, double small_area, const Box& box, Hilbert hilbert, int depth,
             std::vector<Piece>& pieces) {
   if (pieces.empty()) return;
-  if (is_base_leaf(sheet, mesh, small_area, depth, pieces)) {
-    BaseQuad quad{
-        box, {}, {}, static_cast<std::uint32_t>(sheet.face_lists.size()), static_cast<std::uint32_t>(pieces.size())};
-    if constexpr (Hilbert::kChildCount == 4)
-      quad.quad = hilbert;
-    else
-      quad.cube = hilbert;
-    for (const Piece& piece : pieces) sheet.face_lists.push_back(piece.triangle);
-    sheet.base_quads.push_back(quad);
-    return;
-  }
+  if (is_base_leaf(sheet, mesh, small_area, depth, pieces)) return add_base_quad(sheet, box, hilbert, pieces);
   auto children = cut_into_children<Hilbert::kChildCount>(pieces, box.middle());
+  std::size_t count = 0;
+  for (const auto& child : children) count += child.size();
+  if (pieces.size() <= kMostFacesIfSmall &&
+      static_cast<double>(count) > kTooManyInChildren * static_cast<double>(pieces.size()))
+    return add_base_quad(sheet, box, hilbert, pieces);
   std::vector<Piece>().swap(pieces);
   for (unsigned i = 0; i < Hilbert::kChildCount; ++i) {
     const unsigned place = hilbert.place(i);

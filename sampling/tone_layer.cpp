@@ -94,8 +94,25 @@ class ToneLayer::BoundaryWalk {
     lower_ = tones + texel_index(row, layer_.height_, addressing_.repeat_y) * layer_.width_;
     upper_ = tones + texel_index(row + 1, layer_.height_, addressing_.repeat_y) * layer_.width_;
     sums_ = {};
-    for (Index i = x0_; i < column_; ++i) add_column(corners(i), static_cast<double>(i - x0_), 1);
+    if (column_ - x0_ > 2 * kBlock)
+      sums_ = long_row_sums();
+    else
+      for (Index i = x0_; i < column_; ++i) add_column(corners(i), static_cast<double>(i - x0_), 1);
     here_ = corners(column_);
+  }
+
+  /// From the stored prefixes, those of whole repeats taken off.
+  RowSums long_row_sums() const {
+    const Index repeats_before = addressing_.repeat_x ? (x0_ - texel_index(x0_, layer_.width_, true)) : 0;
+    const Index from = x0_ - repeats_before, to = column_ - repeats_before;
+    const auto along = [&](const float* tones) {
+      const int row = static_cast<int>((tones - layer_.tones_.data()) / layer_.width_);
+      const RowPrefix a = layer_.repeated_prefix(row, from), b = layer_.repeated_prefix(row, to);
+      const double f = b.f - a.f;
+      return RowPrefix{f, b.xf - a.xf - static_cast<double>(from) * f, b.ff - a.ff, b.fg - a.fg};
+    };
+    const RowPrefix low = along(lower_), high = along(upper_);
+    return {low.f, high.f, low.xf, high.xf, low.ff, lower_ == upper_ ? low.ff : low.fg, high.ff};
   }
 
   void enter_column(Index column) {
@@ -165,6 +182,49 @@ ToneLayer::ToneLayer(int width, int height, std::vector<float> tones)
   CHECK_EQ(tones_.size(), static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   for (const float tone : tones_) mean_ += tone;
   mean_ /= static_cast<double>(tones_.size());
+  blocks_ = width / kBlock + 1;
+  prefixes_.reserve(static_cast<std::size_t>(blocks_) * static_cast<std::size_t>(height));
+  for (int row = 0; row < height; ++row) {
+    RowPrefix sum;
+    for (int column = 0; column <= width; ++column) {
+      if (column % kBlock == 0) prefixes_.push_back(sum);
+      if (column < width) add_column(sum, row, column);
+    }
+  }
+}
+
+void ToneLayer::add_column(RowPrefix& sum, int row, int column) const {
+  const std::size_t lower = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
+  const std::size_t upper = row + 1 == height_ ? 0 : lower + static_cast<std::size_t>(width_);
+  const auto left = static_cast<std::size_t>(column),
+             right = static_cast<std::size_t>(column + 1 == width_ ? 0 : column + 1);
+  const double a = tones_[lower + left], b = tones_[lower + right], c = tones_[upper + left], d = tones_[upper + right];
+  const double f = .5 * (a + b);
+  sum.f += f;
+  sum.xf += column * f + a / 6 + b / 3;
+  sum.ff += (a * a + a * b + b * b) / 3;
+  sum.fg += (2 * a * c + a * d + b * c + 2 * b * d) / 6;
+}
+
+ToneLayer::RowPrefix ToneLayer::prefix(int row, int column) const {
+  const int block = column / kBlock;
+  RowPrefix sum =
+      prefixes_[static_cast<std::size_t>(row) * static_cast<std::size_t>(blocks_) + static_cast<std::size_t>(block)];
+  for (int i = block * kBlock; i < column; ++i) add_column(sum, row, i);
+  return sum;
+}
+
+ToneLayer::RowPrefix ToneLayer::repeated_prefix(int row, std::int64_t column) const {
+  const std::int64_t repeats = column / width_;
+  RowPrefix sum = prefix(row, static_cast<int>(column - repeats * width_));
+  if (repeats == 0) return sum;
+  const RowPrefix all = prefix(row, width_);
+  const double n = static_cast<double>(repeats), w = width_;
+  sum.xf += n * w * sum.f + n * all.xf + .5 * n * (n - 1) * w * all.f;
+  sum.f += n * all.f;
+  sum.ff += n * all.ff;
+  sum.fg += n * all.fg;
+  return sum;
 }
 
 double ToneLayer::at(const Eigen::Vector2d& point, TexelAddressing addressing) const {

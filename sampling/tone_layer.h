@@ -38,9 +38,23 @@ class ToneLayer {
  private:
   class BoundaryWalk;
 
+  /// Integrals along a row from texel 0, of the tone, of x times it, of its square, and of its product with the row
+  /// above.
+  struct RowPrefix {
+    double f = 0, xf = 0, ff = 0, fg = 0;
+  };
+  static constexpr int kBlock = 16;  ///< texels between two stored prefixes: two bytes a texel
+
+  void add_column(RowPrefix& prefix, int row, int column) const;
+  RowPrefix prefix(int row, int column) const;
+  /// Of a row that goes on repeating: prefix to any column.
+  RowPrefix repeated_prefix(int row, std::int64_t column) const;
+
   int width_ = 0, height_ = 0;
+  int blocks_ = 0;  ///< prefixes a row
   double mean_ = 0;
   std::vector<float> tones_;
+  std::vector<RowPrefix> prefixes_;
 };
 
 }  // namespace hilbrush
