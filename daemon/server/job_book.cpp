@@ -233,7 +233,8 @@ void JobBook::copy_files(Job& job, const ChildOutcome& outcome) {
   if (!outcome.is_ok) return fail_planning(job, {outcome.error_at, outcome.error});
   std::vector<fs::path> files;
   try {
-    for (const auto& file : Json::parse(outcome.result).at("files")) files.emplace_back(file.get<std::string>());
+    const Json result = Json::parse(outcome.result);
+    for (const auto& file : result.at("files")) files.emplace_back(file.get<std::string>());
   } catch (const Json::exception&) {
     return fail_planning(job, {"", "the pipeline gave no list of the model's files"});
   }
