@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr std::array kStages{"load", "disk", "curve", "dots", "plan", "check", "paint", "images"};
+constexpr std::array kStages{"load", "disk", "curve", "dots", "plan", "check", "execute", "paint", "images"};
 constexpr std::size_t kReportBytesMax = 64u << 20;
 
 struct PipelineFlags {
@@ -30,7 +30,7 @@ struct PipelineFlags {
   SettingsFlags settings;
 };
 
-/// "plan 40 % (stage 5 of 8)".
+/// "plan 40 % (stage 5 of 9)".
 std::string stage_text(const std::string& stage, double fraction) {
   std::string text = stage + " " + std::to_string(static_cast<int>(100 * fraction)) + " %";
   if (const auto found = std::find(kStages.begin(), kStages.end(), stage); found != kStages.end())

@@ -83,7 +83,7 @@ mkdir -p "$folder/out/views"; echo '{}' > "$folder/out/report.json"; echo > "$fo
 TEST_F(PipelineCommands, ATerminalGetsABarWithTheStage) {
   use_child(std::string("echo '{\"stage\":\"plan\",\"fraction\":0.5}'\n") + kResult);
   const CommandRun run = run_command({"dry-run", model_, "-o", path("out")}, true);
-  EXPECT_TRUE(run.out.starts_with("[############............] plan 50 % (stage 5 of 8)\r\033[K")) << run.out;
+  EXPECT_TRUE(run.out.starts_with("[############............] plan 50 % (stage 5 of 9)\r\033[K")) << run.out;
 }
 
 TEST_F(PipelineCommands, JsonIsTheResultAndNothingElse) {
