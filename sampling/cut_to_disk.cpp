@@ -112,7 +112,9 @@ void split_long_sides(CutDisk& cut) {
 
 /// Cuts along each closing edge and the paths from both its ends to the root of the tree, but for the stem that all
 /// loops share.
-std::uint32_t cut_loops(Disk& disk, const Distances& distances, const std::vector<TriangleSide>& closing) {
+/// Returns the places where cuts meet.
+std::vector<Eigen::Vector3d> cut_loops(Disk& disk, const Distances& distances,
+                                       const std::vector<TriangleSide>& closing) {
   std::vector<char> is_cut_vertex(disk.positions().size(), 0);
   std::vector<TriangleSide> cut = closing;
   for (const TriangleSide side : closing)
@@ -133,15 +135,28 @@ std::uint32_t cut_loops(Disk& disk, const Distances& distances, const std::vecto
     --degree[disk.from(*loose)], --degree[disk.to(*loose)];
     cut.erase(loose);
   }
+  std::vector<Eigen::Vector3d> forks;
+  for (std::size_t v = 0; v < degree.size(); ++v)
+    if (degree[v] > 2) forks.push_back(disk.positions()[v]);
   for (const TriangleSide side : cut) disk.cut_edge(side);
   disk.finish_cuts();
-  return disk.from(cut.front());
+  return forks;
+}
+
+/// The vertices of a loop that lie at one of the places.
+std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loop,
+                                       const std::vector<Eigen::Vector3d>& places) {
+  std::vector<std::uint32_t> vertices;
+  for (const TriangleSide s : loop)
+    if (std::ranges::find(places, disk.positions()[disk.from(s)]) != places.end()) vertices.push_back(disk.from(s));
+  return vertices;
 }
 
 /// Cuts a closed surface with handles open along the shortest loops through one vertex that leave no handle (Erickson
 /// and Whittlesey, "Greedy optimal homotopy and homology generators", 2005): a tree of shortest paths, a tree of faces
-/// across other edges, longest loops first; each edge that neither tree has closes a loop. Returns a vertex on the cut.
-std::uint32_t cut_handles(Disk& disk) {
+/// across other edges, longest loops first; each edge that neither tree has closes a loop. Returns the places where
+/// loops meet.
+std::vector<Eigen::Vector3d> cut_handles(Disk& disk) {
   const Distances distances = distances_from(0, disk, Arcs(disk));
   struct Candidate {
     double loop_length;
@@ -185,7 +200,7 @@ std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& n
     reason = "its triangles do not form a surface";
     return std::nullopt;
   }
-  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0 || component.genus > 0};
+  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0 || component.genus > 0, {}};
   std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbours());
   if (!cut.is_cut) {
     const auto longest = std::max_element(
@@ -196,12 +211,19 @@ std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& n
   }
   for (const BoundaryLoop& loop : loops) cut.disk.fill(loop);
   if (cut.is_cut) {
-    const std::uint32_t start = component.genus > 0 ? cut_handles(cut.disk) : cut_along_diameter(cut.disk);
-    if (boundary_loops(cut.disk.neighbours()).size() != 1) {
+    std::uint32_t start = 0;
+    std::vector<Eigen::Vector3d> forks;
+    if (component.genus > 0)
+      forks = cut_handles(cut.disk);
+    else
+      start = cut_along_diameter(cut.disk);
+    const std::vector<BoundaryLoop> cuts = boundary_loops(cut.disk.neighbours());
+    if (cuts.size() != 1) {
       reason = "no cut was found that makes it a disk";
       return std::nullopt;
     }
-    cut.outer = loop_from(cut.disk, start);
+    cut.outer = component.genus > 0 ? cuts.front() : loop_from(cut.disk, start);
+    cut.forks = vertices_at(cut.disk, cut.outer, forks);
   }
   split_long_sides(cut);
   return cut;

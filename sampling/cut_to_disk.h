@@ -12,6 +12,8 @@ struct CutDisk {
   BoundaryLoop
       outer;  ///< the one boundary, counter-clockwise seen from outside; of a cut it begins where the cut begins
   bool is_cut = false;
+  std::vector<std::uint32_t>
+      forks;  ///< boundary vertices where cuts meet, in order of `outer`: natural corners of the square
 };
 
 /// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter; more branches

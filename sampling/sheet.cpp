@@ -14,6 +14,8 @@ constexpr double kSmallShare = .25;
 /// The same holds where the children together would have this many times the triangles.
 constexpr double kTooManyInChildren = 1.9;
 constexpr int kDeepest = 24;
+/// A sound map lists each face in a few quads.
+constexpr std::size_t kMostListed = 100'000, kMostListedPerFace = 60;
 /// Chaining by nearest ends is quadratic.
 constexpr std::size_t kMostChained = 3000;
 
@@ -49,11 +51,18 @@ void add_base_quad(Sheet& sheet, const Box& box, Hilbert hilbert, const std::vec
   sheet.base_quads.push_back(quad);
 }
 
+bool is_out_of_bounds(const Sheet& sheet) {
+  return sheet.face_lists.size() > kMostListed + kMostListedPerFace * sheet.faces.size();
+}
+
 template <class Hilbert>
 void divide(Sheet& sheet, const TexturedMesh& mesh, double small_area, const Box& box, Hilbert hilbert, int depth,
             std::vector<Piece>& pieces) {
   if (pieces.empty()) return;
-  if (is_base_leaf(sheet, mesh, small_area, depth, pieces)) return add_base_quad(sheet, box, hilbert, pieces);
+  const bool is_too_much = is_out_of_bounds(sheet);
+  if (is_too_much && Hilbert::kChildCount == 4) return;
+  if (is_too_much || is_base_leaf(sheet, mesh, small_area, depth, pieces))
+    return add_base_quad(sheet, box, hilbert, pieces);
   auto children = cut_into_children<Hilbert::kChildCount>(pieces, box.middle());
   std::size_t count = 0;
   for (const auto& child : children) count += child.size();
@@ -109,21 +118,40 @@ void Sheet::pieces_of(const BaseQuad& quad, std::vector<Piece>& pieces) const {
   }
 }
 
-void build_base_tree(Sheet& sheet, const TexturedMesh& mesh) {
+bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh) {
   std::vector<Piece> pieces;
   pieces.reserve(sheet.faces.size());
-  for (std::uint32_t f = 0; f < sheet.faces.size(); ++f) pieces.push_back(whole(sheet.faces[f], f));
   double area = 0;
-  for (const Piece& piece : pieces)
-    area += 2 * area_b(piece) * mesh.area_vector(sheet.faces[piece.triangle].triangle).norm();
+  for (std::uint32_t f = 0; f < sheet.faces.size(); ++f) {
+    pieces.push_back(whole(sheet.faces[f], f));
+    area += 2 * area_b(pieces.back()) * mesh.area_vector(sheet.faces[f].triangle).norm();
+  }
   const double small_area = kSmallShare * area / static_cast<double>(std::max<std::size_t>(1, pieces.size()));
-  if (sheet.is_on_square)
-    divide(sheet, mesh, small_area, Box{}, HilbertQuad{}, 0, pieces);
-  else
+  if (!sheet.is_on_square) {
     divide(sheet, mesh, small_area, bounding_cube(sheet), HilbertCube{}, 0, pieces);
-  if (sheet.base_quads.empty()) return;
+  } else {
+    for (int i = 1; i <= sheet.square_count; ++i) {
+      std::vector<Piece> rest, here;
+      Piece left, right;
+      for (const Piece& piece : pieces) {
+        if (i == sheet.square_count) {
+          here.push_back(piece);
+          continue;
+        }
+        cut_piece(piece, 0, i, left, right);
+        if (left.corner_count >= 3 && area_b(left) > 0) here.push_back(left);
+        if (right.corner_count >= 3 && area_b(right) > 0) rest.push_back(right);
+      }
+      const Box square{Eigen::Vector3d(i - 1, 0, 0), 1};
+      divide(sheet, mesh, small_area, square, HilbertQuad{}, 0, here);
+      pieces = std::move(rest);
+    }
+  }
+  if (sheet.is_on_square && is_out_of_bounds(sheet)) return false;
+  if (sheet.base_quads.empty()) return true;
   sheet.begin_O = position_of_first_piece(sheet, sheet.base_quads.front(), mesh);
   sheet.end_O = position_of_first_piece(sheet, sheet.base_quads.back(), mesh);
+  return true;
 }
 
 std::vector<std::uint32_t> chain_sheets(const std::vector<Sheet>& sheets) {

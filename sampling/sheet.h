@@ -35,6 +35,7 @@ struct SheetFace {
 struct Sheet {
   std::uint32_t component = 0;
   bool is_on_square = false;
+  int square_count = 1;  ///< squares in a row, each walked from its lower left to its lower right corner
   std::vector<SheetFace> faces;
   std::vector<std::uint32_t> face_lists;
   std::vector<BaseQuad> base_quads;  ///< in order of the curve; empty ones are left out
@@ -45,8 +46,9 @@ struct Sheet {
   void pieces_of(const BaseQuad& quad, std::vector<Piece>& pieces) const;
 };
 
-/// Fills in the base tree of a sheet whose faces are there. Cost O(faces log faces).
-void build_base_tree(Sheet& sheet, const TexturedMesh& mesh);
+/// Fills in the base tree of a sheet whose faces are there. Cost O(faces log faces). On the square it gives up and
+/// returns false if the map is so sheared that the quads would hold each triangle many times.
+bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh);
 
 /// Orders sheets so that the jump from the end of one to the beginning of the next is short; the first stays first.
 std::vector<std::uint32_t> chain_sheets(const std::vector<Sheet>& sheets);

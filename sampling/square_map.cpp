@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -29,7 +30,11 @@ constexpr double kLeastWeight = 1e-2, kMostWeight = 1e3;
 constexpr Eigen::Index kSmallSystem = 2000;
 /// A boundary vertex that turns by more is a corner of the shape itself.
 constexpr double kShapeCornerTurn_rad = std::numbers::pi / 4;
-constexpr double kLeastSideShare = .03;
+constexpr double kLeastSideShare = .005;
+/// Strips are mapped onto at most so many squares in a row.
+constexpr int kMostSquares = 64;
+/// Of more forks than these only the ones nearest to the quarters of the boundary are tried as corners.
+constexpr std::size_t kMostForks = 16;
 
 double angle(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -83,31 +88,95 @@ Corners corners_by_length(const std::vector<double>& along) {
   return corners;
 }
 
+std::array<double, 4> side_lengths(const Corners& corners, const std::vector<double>& along) {
+  std::array<double, 4> sides{};
+  for (std::size_t k = 0; k < 3; ++k) sides[k] = along[corners[k + 1]] - along[corners[k]];
+  sides[3] = along.back() - along[corners[3]] + along[corners[0]];
+  return sides;
+}
+
+/// Four of the forks so that opposite sides are alike and none is short.
+std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<double>& along) {
+  std::vector<std::size_t> forks;
+  for (std::size_t i = 0; i < cut.outer.size(); ++i)
+    if (std::ranges::find(cut.forks, cut.disk.from(cut.outer[i])) != cut.forks.end()) forks.push_back(i);
+  if (forks.size() < 4 || forks.size() > kMostForks) return std::nullopt;
+  std::optional<Corners> best;
+  double best_score = std::numeric_limits<double>::infinity();
+  const std::size_t n = forks.size();
+  for (std::size_t a = 0; a + 3 < n; ++a)
+    for (std::size_t b = a + 1; b + 2 < n; ++b)
+      for (std::size_t c = b + 1; c + 1 < n; ++c)
+        for (std::size_t d = c + 1; d < n; ++d) {
+          const Corners corners{forks[a], forks[b], forks[c], forks[d]};
+          const auto sides = side_lengths(corners, along);
+          const double shortest = *std::min_element(sides.begin(), sides.end());
+          const double score = std::abs(sides[0] - sides[2]) + std::abs(sides[1] - sides[3]) - .1 * shortest;
+          if (shortest > kLeastSideShare * along.back() && score < best_score) best = corners, best_score = score;
+        }
+  return best;
+}
+
+/// How many squares in a row suit a strip with these sides, the first one running along the row.
+int squares_for(const std::array<double, 4>& sides, double area) {
+  const double length = .5 * (sides[0] + sides[2]), width = .5 * (sides[1] + sides[3]);
+  // A boundary that is short against the area belongs to a blob, not to a strip.
+  if (area > 2 * length * width) return 1;
+  return std::clamp(static_cast<int>(std::lround(length / width)), 1, kMostSquares);
+}
+
+double area_of(const Disk& disk) {
+  double area = 0;
+  for (const Triangle& f : disk.faces()) {
+    const Vector3d& p = disk.positions()[f[0]];
+    area += .5 * (disk.positions()[f[1]] - p).cross(disk.positions()[f[2]] - p).norm();
+  }
+  return area;
+}
+
 /// The boundary's places on the square, and which sides of the square a vertex lies on (bits; corners have two).
 struct SquareBoundary {
-  SquareMap places;
+  SquareMap map;
   std::vector<std::uint8_t> sides;
   std::vector<char> is_boundary;
 };
 
+struct SquareCorners {
+  Corners corners;
+  int square_count = 1;
+};
+
+SquareCorners choose_corners(const CutDisk& cut, const std::vector<double>& along) {
+  const auto natural = cut.is_cut ? corners_at_forks(cut, along) : corners_of_shape(cut, along);
+  if (!natural) return {corners_by_length(along), 1};
+  const Corners& c = *natural;
+  const auto s = side_lengths(c, along);
+  const double area = area_of(cut.disk);
+  if (s[0] + s[2] >= s[1] + s[3]) return {c, squares_for(s, area)};
+  return {{c[1], c[2], c[3], c[0]}, squares_for({s[1], s[2], s[3], s[0]}, area)};
+}
+
 SquareBoundary place_boundary(const CutDisk& cut) {
   const std::vector<double> along = lengths_along(cut);
-  const auto shape = cut.is_cut ? std::nullopt : corners_of_shape(cut, along);
-  const Corners corners = shape ? *shape : corners_by_length(along);
-  const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(1, 0), Vector2d(1, 1), Vector2d(0, 1)};
+  const auto [corners, square_count] = choose_corners(cut, along);
+  const double width = square_count;
+  const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(width, 0), Vector2d(width, 1), Vector2d(0, 1)};
 
   SquareBoundary boundary;
-  boundary.places.assign(cut.disk.positions().size(), Vector2d(.5, .5));
-  boundary.sides.assign(boundary.places.size(), 0);
-  boundary.is_boundary.assign(boundary.places.size(), 0);
+  boundary.map.square_count = square_count;
+  boundary.map.places.assign(cut.disk.positions().size(), Vector2d(.5 * width, .5));
+  boundary.sides.assign(cut.disk.positions().size(), 0);
+  boundary.is_boundary.assign(cut.disk.positions().size(), 0);
   const std::size_t n = cut.outer.size();
   for (std::size_t k = 0; k < 4; ++k) {
-    const std::size_t begin = corners[k], end = k < 3 ? corners[k + 1] : corners[0] + n;
+    const std::size_t begin = corners[k], end = corners[(k + 1) % 4] + (corners[(k + 1) % 4] <= begin ? n : 0);
     const auto at = [&](std::size_t i) { return along[i % n] + (i >= n ? along.back() : 0); };
+    const Vector2d& from = square[k];
+    const Vector2d& to = square[(k + 1) % 4];
     for (std::size_t i = begin; i <= end; ++i) {
       const std::uint32_t v = cut.disk.from(cut.outer[i % n]);
       const double f = (at(i) - at(begin)) / (at(end) - at(begin));
-      boundary.places[v] = i == end ? square[(k + 1) % 4] : Vector2d(square[k] + f * (square[(k + 1) % 4] - square[k]));
+      boundary.map.places[v] = i == end ? to : Vector2d(from + f * (to - from));
       boundary.sides[v] |= static_cast<std::uint8_t>(1u << k);
       boundary.is_boundary[v] = 1;
     }
@@ -125,7 +194,7 @@ void split_chords(Disk& disk, SquareBoundary& boundary) {
       if (disk.neighbours()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
         continue;
       disk.split_edge(side);
-      boundary.places.emplace_back(.5, .5);
+      boundary.map.places.emplace_back(.5, .5);
       boundary.sides.push_back(0);
       boundary.is_boundary.push_back(0);
     }
@@ -157,7 +226,7 @@ struct MapSystem {
 
 MapSystem assemble(const Disk& disk, const SquareBoundary& boundary, HalfWeight half) {
   MapSystem system;
-  std::vector<int> index(boundary.places.size(), -1);
+  std::vector<int> index(boundary.map.places.size(), -1);
   for (std::uint32_t v = 0; v < index.size(); ++v)
     if (!boundary.is_boundary[v]) {
       index[v] = static_cast<int>(system.inner.size());
@@ -173,7 +242,7 @@ MapSystem assemble(const Disk& disk, const SquareBoundary& boundary, HalfWeight 
     if (index[w] >= 0)
       entries.emplace_back(index[v], index[w], -weight);
     else
-      system.right.row(index[v]) += weight * boundary.places[w].transpose();
+      system.right.row(index[v]) += weight * boundary.map.places[w].transpose();
   };
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::size_t c = 0; c < 3; ++c) {
@@ -187,7 +256,7 @@ MapSystem assemble(const Disk& disk, const SquareBoundary& boundary, HalfWeight 
 }
 
 template <class Solver>
-bool solve_with(Solver&& solver, const MapSystem& system, SquareMap& map) {
+bool solve_with(Solver&& solver, const MapSystem& system, std::vector<Vector2d>& map) {
   solver.compute(system.matrix);
   if (solver.info() != Eigen::Success) return false;
   const Eigen::MatrixX2d places = solver.solve(system.right);
@@ -196,34 +265,34 @@ bool solve_with(Solver&& solver, const MapSystem& system, SquareMap& map) {
   return true;
 }
 
-bool solve_symmetric(const MapSystem& system, SquareMap& map) {
+bool solve_symmetric(const MapSystem& system, std::vector<Vector2d>& map) {
   if (system.matrix.rows() == 0) return true;
   if (system.matrix.rows() < kSmallSystem)
     return solve_with(Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>>(), system, map);
   return solve_with(Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::MetisOrdering<int>>(), system, map);
 }
 
-bool solve_general(const MapSystem& system, SquareMap& map) {
+bool solve_general(const MapSystem& system, std::vector<Vector2d>& map) {
   if (system.matrix.rows() == 0) return true;
   return solve_with(Eigen::SparseLU<Sparse, Eigen::COLAMDOrdering<int>>(), system, map);
 }
 
 }  // namespace
 
-std::size_t count_flipped(const Disk& disk, const SquareMap& map) {
+std::size_t count_flipped(const Disk& disk, const std::vector<Vector2d>& places) {
   return static_cast<std::size_t>(std::ranges::count_if(
-      disk.faces(), [&](const Triangle& f) { return orientation(map[f[0]], map[f[1]], map[f[2]]) <= 0; }));
+      disk.faces(), [&](const Triangle& f) { return orientation(places[f[0]], places[f[1]], places[f[2]]) <= 0; }));
 }
 
 std::optional<SquareMap> map_to_square(CutDisk& cut) {
   if (cut.outer.size() < 4) return std::nullopt;
   SquareBoundary boundary = place_boundary(cut);
   split_chords(cut.disk, boundary);
-  SquareMap map = boundary.places;
-  if (solve_symmetric(assemble(cut.disk, boundary, cotan_half), map) && count_flipped(cut.disk, map) == 0) return map;
-  map = boundary.places;
-  if (solve_general(assemble(cut.disk, boundary, mean_value_half), map) && count_flipped(cut.disk, map) == 0)
-    return map;
+  SquareMap map = boundary.map;
+  const auto is_valid = [&] { return count_flipped(cut.disk, map.places) == 0; };
+  if (solve_symmetric(assemble(cut.disk, boundary, cotan_half), map.places) && is_valid()) return map;
+  map.places = boundary.map.places;
+  if (solve_general(assemble(cut.disk, boundary, mean_value_half), map.places) && is_valid()) return map;
   return std::nullopt;
 }
 

@@ -14,12 +14,13 @@ namespace {
 Sheet sheet_on_square(const CutDisk& cut, const SquareMap& map) {
   Sheet sheet;
   sheet.is_on_square = true;
+  sheet.square_count = map.square_count;
   for (std::size_t f = 0; f < cut.disk.faces().size(); ++f) {
     const FaceSource& source = cut.disk.sources()[f];
     if (source.triangle == kNoTriangle) continue;
     SheetFace face{source.triangle, {}};
     for (std::size_t c = 0; c < 3; ++c) {
-      const Eigen::Vector2d& place = map[cut.disk.faces()[f][c]];
+      const Eigen::Vector2d& place = map.places[cut.disk.faces()[f][c]];
       face.corners[c] = {{place.x(), place.y(), 0}, source.corners[c]};
     }
     sheet.faces.push_back(face);
@@ -39,13 +40,17 @@ Sheet sheet_in_space(const TexturedMesh& mesh, const Component& component) {
 Sheet make_sheet(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
                  ComponentReport& report) {
   if (auto cut = cut_to_disk(mesh, neighbours, component, report.order_reason)) {
-    if (const auto map = map_to_square(*cut)) {
-      report.is_mapped = true;
-      return sheet_on_square(*cut, *map);
-    }
     report.order_reason = "no map of it onto the square without a flipped triangle was found";
+    if (const auto map = map_to_square(*cut)) {
+      Sheet sheet = sheet_on_square(*cut, *map);
+      report.is_mapped = build_base_tree(sheet, mesh);
+      report.order_reason = report.is_mapped ? "" : "its map onto the square is too sheared to be walked";
+      if (report.is_mapped) return sheet;
+    }
   }
-  return sheet_in_space(mesh, component);
+  Sheet sheet = sheet_in_space(mesh, component);
+  build_base_tree(sheet, mesh);
+  return sheet;
 }
 
 }  // namespace
@@ -67,7 +72,6 @@ SurfaceCurve::SurfaceCurve(const TexturedMesh& mesh, const Progress& progress)
     report.area_m2 = component.area_m2;
     Sheet sheet = make_sheet(mesh, curve.neighbours, component, report);
     sheet.component = static_cast<std::uint32_t>(curve.components.size());
-    build_base_tree(sheet, mesh);
     sheets.push_back(std::move(sheet));
     curve.components.push_back(std::move(report));
     done += component.triangles.size();
