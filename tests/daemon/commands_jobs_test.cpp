@@ -166,7 +166,7 @@ TEST(Watch, APipeGetsLinesUntilTheJobIsDone) {
   EXPECT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(run.out,
             "job 7: queued, 0 of 100 dots exposed\n"
-            "job 7: planning, load 50 %\n"
+            "job 7: planning, load\n"
             "job 7: painting, 0 of 100 dots exposed, 0 %\n"
             "job 7: painting, 11 of 100 dots exposed, 11 %, about 0:00:09 left\n"
             "job 7: done, 100 of 100 dots exposed\n"
