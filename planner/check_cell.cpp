@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstring>
 #include <numbers>
 
 #include "sampling/check.h"
@@ -29,13 +29,15 @@ struct CheckCell::Rays {
     CHECK(device != nullptr);
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-    for (const auto& p : mesh.vertices) vertices.push_back(p.cast<float>());
-    vertices.emplace_back(Eigen::Vector3f::Zero());  // Embree reads 16 bytes at the last one
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices.data(), 0,
-                               sizeof(Eigen::Vector3f), mesh.vertices.size());
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
-                               sizeof(mesh.triangles[0]), mesh.triangles.size());
+    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                             sizeof(Eigen::Vector3f), mesh.vertices.size());
+    void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                              sizeof(mesh.triangles[0]), mesh.triangles.size());
+    CHECK(vertices != nullptr && triangles != nullptr);
+    std::transform(mesh.vertices.begin(), mesh.vertices.end(), static_cast<Eigen::Vector3f*>(vertices),
+                   [](const Eigen::Vector3d& p) { return Eigen::Vector3f(p.cast<float>()); });
+    std::memcpy(triangles, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);
@@ -50,7 +52,6 @@ struct CheckCell::Rays {
 
   RTCDevice device;
   RTCScene scene = nullptr;
-  std::vector<Eigen::Vector3f> vertices;
 };
 
 CheckCell::CheckCell(const TexturedMesh& mesh, const CellDescription& cell)

@@ -12,10 +12,10 @@
 namespace hilbrush {
 
 struct Exposure {
-  Eigen::Vector3d position_O;  ///< where the beam shall land, m
-  Eigen::Vector3f normal_O;    ///< of the face there
-  float tone = 0;              ///< wanted coverage, 0..1
-  float energy_j = 0;          ///< = power_w * pulse_s
+  Eigen::Vector3d position_O = Eigen::Vector3d::Zero();  ///< where the beam shall land, m
+  Eigen::Vector3f normal_O = Eigen::Vector3f::Zero();    ///< of the face there
+  float tone = 0;                                        ///< wanted coverage, 0..1
+  float energy_j = 0;                                    ///< = power_w * pulse_s
   Joints joints{};
   float power_w = 0, pulse_s = 0;
   float incidence = 0;          ///< rad, against the face normal

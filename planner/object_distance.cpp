@@ -14,21 +14,6 @@ constexpr double kNodesMax = 1.5e6;
 constexpr double kSurfelsMax = 3e6;
 constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
 
-/// The grid's neighbours that a raster scan has already passed.
-constexpr std::array<std::array<int, 3>, 13> kPassedNeighbours{{{-1, 0, 0},
-                                                                {-1, -1, 0},
-                                                                {0, -1, 0},
-                                                                {1, -1, 0},
-                                                                {-1, -1, -1},
-                                                                {0, -1, -1},
-                                                                {1, -1, -1},
-                                                                {-1, 0, -1},
-                                                                {0, 0, -1},
-                                                                {1, 0, -1},
-                                                                {-1, 1, -1},
-                                                                {0, 1, -1},
-                                                                {1, 1, -1}}};
-
 }  // namespace
 
 ObjectDistance::ObjectDistance(const TexturedMesh& mesh, double range_m) : range_m_(range_m) {
@@ -41,12 +26,12 @@ void ObjectDistance::choose_grid(const TexturedMesh& mesh) {
   const Eigen::Vector3d extent = high - low + Eigen::Vector3d::Constant(2 * range_m_);
   step_m_ = std::max(kStepM, std::cbrt(extent.prod() / kNodesMax));
   low_O_ = low - Eigen::Vector3d::Constant(range_m_);
+  spacing_m_ = std::max(step_m_ / 2, std::sqrt(2 * mesh.area_m2() / kSurfelsMax));
   size_ = (extent / step_m_).array().ceil().cast<int>() + 1;
 }
 
-/// Points so dense that none of the surface is farther than about half a grid step from one.
 std::vector<Eigen::Vector3f> ObjectDistance::surface_points(const TexturedMesh& mesh) const {
-  const double spacing = std::max(step_m_ / 4, std::sqrt(2 * mesh.area_m2() / kSurfelsMax));
+  const double spacing = spacing_m_;
   std::vector<Eigen::Vector3f> points;
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
     const Eigen::Vector3d& a = mesh.corner(t, 0);
@@ -64,7 +49,7 @@ std::vector<Eigen::Vector3f> ObjectDistance::surface_points(const TexturedMesh& 
 void ObjectDistance::spread(const std::vector<Eigen::Vector3f>& points) {
   const std::size_t node_count = index(0, 0, size_.z());
   std::vector<std::uint32_t> nearest(node_count, kNobody);
-  std::vector<float> distance2(node_count, static_cast<float>(range_m_ * range_m_));
+  std::vector<float> distance2(node_count, std::numeric_limits<float>::max());
   const Eigen::Vector3f low = low_O_.cast<float>();
   const float step = static_cast<float>(step_m_);
 
@@ -82,29 +67,33 @@ void ObjectDistance::spread(const std::vector<Eigen::Vector3f>& points) {
     for (int c = 0; c < 8; ++c) offer(corner.x() + (c & 1), corner.y() + (c >> 1 & 1), corner.z() + (c >> 2), k);
   }
 
-  const auto learn = [&](int x, int y, int z, int sign) {
-    for (const auto& [dx, dy, dz] : kPassedNeighbours) {
-      const int nx = x + sign * dx, ny = y + sign * dy, nz = z + sign * dz;
-      if (nx < 0 || ny < 0 || nz < 0 || nx >= size_.x() || ny >= size_.y() || nz >= size_.z()) continue;
-      const std::uint32_t point = nearest[index(nx, ny, nz)];
-      if (point != kNobody && point != nearest[index(x, y, z)]) offer(x, y, z, point);
-    }
+  // Each slab learns from the one before it, then passes on what it knows within itself: rows there and back, columns
+  // there and back.
+  const auto learn = [&](int x, int y, int z, const std::array<int, 3>& step_to) {
+    const int nx = x + step_to[0], ny = y + step_to[1], nz = z + step_to[2];
+    if (nx < 0 || ny < 0 || nz < 0 || nx >= size_.x() || ny >= size_.y() || nz >= size_.z()) return;
+    const std::uint32_t point = nearest[index(nx, ny, nz)];
+    if (point != kNobody && point != nearest[index(x, y, z)]) offer(x, y, z, point);
   };
-  for (int z = 0; z < size_.z(); ++z)
-    for (int y = 0; y < size_.y(); ++y) {
-      for (int x = 0; x < size_.x(); ++x) learn(x, y, z, 1);
-      for (int x = size_.x() - 1; x >= 0; --x) learn(x, y, z, -1);
+  const auto scan_row = [&](int y, int z, int dy) {
+    for (int x = 0; x < size_.x(); ++x) {
+      for (int dx = -1; dx <= 1; ++dx) learn(x, y, z, {dx, dy, 0});
+      learn(x, y, z, {-1, 0, 0});
     }
-  for (int z = size_.z() - 1; z >= 0; --z)
-    for (int y = size_.y() - 1; y >= 0; --y) {
-      for (int x = size_.x() - 1; x >= 0; --x) learn(x, y, z, -1);
-      for (int x = 0; x < size_.x(); ++x) learn(x, y, z, 1);
-    }
+    for (int x = size_.x() - 1; x >= 0; --x) learn(x, y, z, {1, 0, 0});
+  };
+  const auto scan_slab = [&](int z, int dz) {
+    for (int y = 0; y < size_.y(); ++y)
+      for (int x = 0; x < size_.x(); ++x)
+        for (int n = 0; n < 9; ++n) learn(x, y, z, {n % 3 - 1, n / 3 - 1, dz});
+    for (int y = 0; y < size_.y(); ++y) scan_row(y, z, -1);
+    for (int y = size_.y() - 1; y >= 0; --y) scan_row(y, z, 1);
+  };
+  for (int z = 0; z < size_.z(); ++z) scan_slab(z, -1);
+  for (int z = size_.z() - 1; z >= 0; --z) scan_slab(z, 1);
   distance_m_.resize(node_count);
-  std::transform(distance2.begin(), distance2.end(), distance_m_.begin(), [](float d2) { return std::sqrt(d2); });
-  // A point of the surface has one of the lattice points within half the spacing of their diagonal, .6 of the spacing.
-  const double gap = .6 * std::max(step_m_ / 4, 0.);
-  surfel_error_m_ = gap * gap / (2 * step_m_);
+  std::transform(distance2.begin(), distance2.end(), distance_m_.begin(),
+                 [range = static_cast<float>(range_m_)](float d2) { return std::min(range, std::sqrt(d2)); });
 }
 
 double ObjectDistance::operator()(const Eigen::Vector3d& p_O) const {

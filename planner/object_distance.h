@@ -18,8 +18,11 @@ class ObjectDistance {
   /// At most range_m(); range_m() itself outside the grid.
   double operator()(const Eigen::Vector3d& p_O) const;
   double range_m() const { return range_m_; }
-  /// How much an interpolated distance of `radius_m` or more may be too large.
-  double error_m(double radius_m) const { return surfel_error_m_ + .375 * step_m_ * step_m_ / radius_m; }
+  /// How much an interpolated distance of `radius_m` or more may be too large: interpolation across a step, and the
+  /// gaps between the points that stand for the surface (none of it is farther than .6 of their spacing from one).
+  double error_m(double radius_m) const {
+    return (.375 * step_m_ * step_m_ + .18 * spacing_m_ * spacing_m_) / radius_m;
+  }
 
  private:
   std::size_t index(int x, int y, int z) const {
@@ -28,10 +31,11 @@ class ObjectDistance {
            static_cast<std::size_t>(x);
   }
   void choose_grid(const TexturedMesh& mesh);
+  /// Points on all triangles, spacing_m_ apart at most.
   std::vector<Eigen::Vector3f> surface_points(const TexturedMesh& mesh) const;
   void spread(const std::vector<Eigen::Vector3f>& points);
 
-  double range_m_, step_m_ = 0, surfel_error_m_ = 0;
+  double range_m_, step_m_ = 0, spacing_m_ = 0;
   Eigen::Vector3d low_O_;
   Eigen::Vector3i size_;
   std::vector<float> distance_m_;

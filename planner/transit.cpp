@@ -11,6 +11,8 @@ namespace {
 
 /// Nearer than this the tool does not come while it moves.
 constexpr double kLeastSlackM = .4e-3;
+/// ... unless it starts nearer, because it was stopped there: then it may leave.
+constexpr double kLeastSlackOfEscapeM = .05e-3;
 constexpr double kBackOffsM[] = {.01, .03, .06, .1};
 
 /// Distance covered `time_s` into a move over `distance` from rest to rest.
@@ -69,7 +71,13 @@ double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
          moved(kTilt) * reach_.object_radius_m + moved(kRotation) * reach_.object_turn_m;
 }
 
+double Transit::least_slack_m(const Joints& from) const {
+  const double slack_m = reach_.clearance.slack_m(reach_.kinematics.tool_pose(from));
+  return std::clamp(.5 * slack_m, kLeastSlackOfEscapeM, kLeastSlackM);
+}
+
 bool Transit::is_clear(const Joints& from, const Joints& to) const {
+  const double least_m = least_slack_m(from);
   const auto slack_at = [&](const Joints& joints) {
     return reach_.clearance.slack_m(reach_.kinematics.tool_pose(joints));
   };
@@ -84,7 +92,7 @@ bool Transit::is_clear(const Joints& from, const Joints& to) const {
   Joints now = from;
   double now_s = 0, step_s = end_s / 4;
   while (true) {
-    if (slack_m < kLeastSlackM) return false;
+    if (slack_m < least_m) return false;
     if (travel_bound_m(now, to) <= slack_m) return true;
     // The axes do not turn round during a move, so the bound between two moments holds for all between them.
     step_s = std::min(2 * step_s, end_s - now_s);

@@ -1,0 +1,203 @@
+#include "planner/program_check.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <string>
+
+#include "planner/kinematics.h"
+#include "tests/planner/workpieces.h"
+
+namespace hilbrush {
+namespace {
+
+/// A good program, to be spoilt in one way after another.
+struct Work {
+  CellDescription cell = default_cell();
+  PlanOptions options;
+  TexturedMesh mesh = ball(.02);
+  DotSequence dots = scatter(mesh, 2e-3);
+  Plan plan = plan_exposures(Reach(mesh, cell, options), dots);
+
+  std::vector<ProgramFault> check() const {
+    return check_program(plan.program, plan.skipped, dots, mesh, cell, options);
+  }
+  Exposure& exposure(std::size_t i) { return plan.program.exposures[i]; }
+  /// An exposure that the one before leads to directly.
+  std::size_t direct_one() const {
+    std::size_t i = plan.program.exposures.size() / 2;
+    while (!plan.program.vias_before(i).empty()) ++i;
+    return i;
+  }
+  /// Exposes dot `i` with another yaw and the same table, whether that is allowed or not.
+  void turn_yaw(std::size_t i, double angle) {
+    const Kinematics kinematics(cell);
+    Joints& joints = exposure(i).joints;
+    const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
+    const Elbow elbow = joints[kJ2] > 0 ? Elbow::kPositive : Elbow::kNegative;
+    ASSERT_TRUE(
+        kinematics.solve_arm(table.to_W(exposure(i).position_O), kinematics.yaw(joints) + angle, elbow, joints));
+  }
+  void flip_elbow(std::size_t i) {
+    const Kinematics kinematics(cell);
+    Joints& joints = exposure(i).joints;
+    const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
+    const Elbow other = joints[kJ2] > 0 ? Elbow::kNegative : Elbow::kPositive;
+    const double j4 = joints[kJ4];
+    ASSERT_TRUE(kinematics.solve_arm(table.to_W(exposure(i).position_O), kinematics.yaw(joints), other, joints));
+    joints[kJ4] = kinematics.wind(kJ4, joints[kJ4], j4);
+  }
+};
+
+const Work& good_work() {
+  static const Work work;
+  return work;
+}
+
+TEST(ProgramCheck, AGoodProgramPasses) {
+  for (const auto& fault : good_work().check()) ADD_FAILURE() << "exposure " << fault.exposure << ": " << fault.what;
+}
+
+struct Spoiling {
+  const char* name;
+  const char* expected;  ///< part of one of the faults' sentences
+  std::function<void(Work&)> spoil;
+};
+
+void PrintTo(const Spoiling& spoiling, std::ostream* out) {
+  *out << spoiling.name;
+}
+
+class SpoiltProgram : public testing::TestWithParam<Spoiling> {};
+
+TEST_P(SpoiltProgram, IsCaught) {
+  Work work = good_work();
+  GetParam().spoil(work);
+  const auto faults = work.check();
+  ASSERT_FALSE(faults.empty());
+  bool is_named = false;
+  std::string all;
+  for (const auto& fault : faults) {
+    is_named = is_named || fault.what.find(GetParam().expected) != std::string::npos;
+    all += fault.what + "\n";
+  }
+  EXPECT_TRUE(is_named) << "expected \"" << GetParam().expected << "\" among:\n" << all;
+}
+
+constexpr std::size_t kVictim = 200;
+
+const Spoiling kSpoilings[] = {
+    {"DotTwice", "more than once", [](Work& w) { w.exposure(kVictim).dot_index = w.exposure(kVictim + 1).dot_index; }},
+    {"DotMissing", "neither exposed nor skipped",
+     [](Work& w) {
+       w.plan.program.exposures.pop_back();
+       w.plan.program.vias.back().before_exposure = static_cast<std::uint32_t>(w.plan.program.exposures.size());
+       for (auto& via : w.plan.program.vias)
+         via.before_exposure = std::min(via.before_exposure, w.plan.program.vias.back().before_exposure);
+     }},
+    {"DotUnknown", "none of the", [](Work& w) { w.exposure(kVictim).dot_index = 1u << 30; }},
+    {"ExposedAndSkipped", "more than once",
+     [](Work& w) {
+       w.plan.skipped.push_back({w.exposure(kVictim).dot_index, SkipReason::kOccluded, "a reason"});
+     }},
+    {"SkippedWithoutReason", "without a reason",
+     [](Work& w) {
+       if (w.plan.skipped.empty()) w.plan.skipped.push_back({0, SkipReason::kOccluded, ""});
+       w.plan.skipped.front().detail.clear();
+     }},
+    {"OtherPitch", "pitch", [](Work& w) { w.plan.program.pitch_m *= 1.01; }},
+    {"NotFromHome", "start at home", [](Work& w) { w.plan.program.vias.front().joints[kJ1] += .01; }},
+    {"NotToHome", "end at home", [](Work& w) { w.plan.program.vias.pop_back(); }},
+    {"ViaOutOfOrder", "out of order", [](Work& w) { w.plan.program.vias.front().before_exposure = 300; }},
+    {"ViaOutOfLimits", "is outside", [](Work& w) { w.plan.program.vias.front().joints[kJ3] = .31; }},
+    {"JointOutOfLimits", "is outside", [](Work& w) { w.exposure(kVictim).joints[kJ1] = 2.5; }},
+    {"JointNotANumber", "is outside", [](Work& w) { w.exposure(kVictim).joints[kTilt] = std::nan(""); }},
+    {"FocusOff", "off the dot", [](Work& w) { w.exposure(kVictim).joints[kJ3] += 1e-8; }},
+    {"PlaceChanged", "not that of dot", [](Work& w) { w.exposure(kVictim).position_O.x() += 1e-9; }},
+    {"ToneChanged", "not that of dot", [](Work& w) { w.exposure(kVictim).tone = .5F; }},
+    {"TooOblique", "more than 45", [](Work& w) { w.turn_yaw(kVictim, 1.5); }},
+    {"IncidenceMisstated", "is said to be", [](Work& w) { w.exposure(kVictim).incidence += .05F; }},
+    {"PowerTooHigh", "W is outside", [](Work& w) { w.exposure(kVictim).power_w = 1; }},
+    {"PowerNotANumber", "W is outside", [](Work& w) { w.exposure(kVictim).power_w = std::nanf(""); }},
+    {"PulseTooLong", "pulse", [](Work& w) { w.exposure(kVictim).pulse_s = .2F; }},
+    {"EnergyWrong", "J is not", [](Work& w) { w.exposure(kVictim).energy_j *= 1.1F; }},
+    {"WrongDose", "level asks for",
+     [](Work& w) {
+       w.exposure(kVictim).energy_j *= 2;
+       w.exposure(kVictim).power_w *= 2;
+     }},
+    {"ElbowFlips", "elbow flips", [](Work& w) { w.flip_elbow(w.direct_one()); }},
+    {"J4Winds", "without a retract",
+     [](Work& w) {
+       const std::size_t i = w.direct_one();
+       double& j4 = w.exposure(i).joints[kJ4];
+       j4 += j4 > 0 ? -2 * std::numbers::pi : 2 * std::numbers::pi;
+     }},
+    {"CWinds", "without a retract",
+     [](Work& w) { w.exposure(w.direct_one()).joints[kRotation] += 2 * std::numbers::pi; }},
+    {"ViaThroughTheObject", "touches",
+     [](Work& w) {
+       // A way-point that puts the focus 60 mm beyond the dot, so that the lens is where the dot is.
+       const Kinematics kinematics(w.cell);
+       const std::size_t i = w.direct_one();
+       Via via{static_cast<std::uint32_t>(i), w.exposure(i).joints};
+       const TablePose table = kinematics.table_pose(via.joints[kTilt], via.joints[kRotation]);
+       const double yaw = kinematics.yaw(via.joints);
+       const Eigen::Vector3d focus_W = table.to_W(w.exposure(i).position_O) + .06 * kinematics.beam_W(yaw);
+       const Elbow elbow = via.joints[kJ2] > 0 ? Elbow::kPositive : Elbow::kNegative;
+       ASSERT_TRUE(kinematics.solve_arm(focus_W, yaw, elbow, via.joints));
+       via.joints[kJ3] = std::max(via.joints[kJ3], 0.);
+       const auto at = std::lower_bound(w.plan.program.vias.begin(), w.plan.program.vias.end(), via.before_exposure,
+                                        [](const Via& a, std::uint32_t b) { return a.before_exposure < b; });
+       w.plan.program.vias.insert(at, via);
+     }},
+    {"RetractsRemoved", "on the way there",
+     [](Work& w) {
+       // Every re-pose goes straight through the air - and, sooner or later, through the ball.
+       std::erase_if(w.plan.program.vias, [&](const Via& via) {
+         return via.before_exposure > 0 && via.before_exposure < w.plan.program.exposures.size();
+       });
+       w.plan.program.vias = {w.plan.program.vias.front(), w.plan.program.vias.back()};
+       // Two dots on opposite sides, one after the other, with the arm on the other side of the object.
+       std::size_t a = 0, b = 0;
+       for (std::size_t i = 0; i < w.plan.program.exposures.size(); ++i) {
+         if (w.exposure(i).position_O.x() > w.exposure(a).position_O.x()) a = i;
+         if (w.exposure(i).position_O.x() < w.exposure(b).position_O.x()) b = i;
+       }
+       std::swap(w.plan.program.exposures[a],
+                 w.plan.program.exposures[b + 1 < w.plan.program.exposures.size() ? b + 1 : b - 1]);
+     }},
+    {"AnotherMesh", "before the dot",
+     [](Work& w) {
+       // A screen of 4 mm in one dot's beam, 20 mm before it.
+       const Eigen::Vector3d beam_O = Kinematics(w.cell).tool_pose(w.exposure(kVictim).joints).beam_O;
+       const Eigen::Vector3d center = w.exposure(kVictim).position_O - .02 * beam_O;
+       const Eigen::Vector3d u = .004 * beam_O.unitOrthogonal(), v = beam_O.cross(u);
+       const auto n = static_cast<std::uint32_t>(w.mesh.vertices.size());
+       w.mesh.vertices.insert(w.mesh.vertices.end(), {center + u, center - u + v, center - u - v});
+       w.mesh.triangles.push_back({n, n + 1, n + 2});
+     }},
+    {"SmallerMesh", "misses the object",
+     [](Work& w) {
+       for (auto& p : w.mesh.vertices) p *= .5;
+     }},
+    {"FartherCell", "off the dot", [](Work& w) { w.cell.table.tilt_axis_W.x() += 1e-6; }},
+    {"FatterLens", "lens body", [](Work& w) { w.cell.lens.radius_m = .05; }},
+};
+
+INSTANTIATE_TEST_SUITE_P(Each, SpoiltProgram, testing::ValuesIn(kSpoilings),
+                         [](const auto& parameter) { return std::string(parameter.param.name); });
+
+TEST(ProgramCheck, StopsAtItsLimitWithTheFirstFaults) {
+  Work work = good_work();
+  for (auto& exposure : work.plan.program.exposures) exposure.tone = .25F;
+  const auto faults =
+      check_program(work.plan.program, work.plan.skipped, work.dots, work.mesh, work.cell, work.options, 3);
+  ASSERT_EQ(faults.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(faults[i].exposure, i);
+}
+
+}  // namespace
+}  // namespace hilbrush

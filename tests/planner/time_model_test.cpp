@@ -1,0 +1,95 @@
+#include "planner/time_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "planner/plan.h"
+#include "planner/transit.h"
+#include "tests/planner/workpieces.h"
+
+namespace hilbrush {
+namespace {
+
+TEST(TimeModel, TrapezoidClosedForms) {
+  EXPECT_EQ(trapezoid_s(0, 2, 4), 0);
+  EXPECT_DOUBLE_EQ(trapezoid_s(.25, 2, 4), 2 * std::sqrt(.25 / 4));  // a triangle: full speed is never reached
+  EXPECT_DOUBLE_EQ(trapezoid_s(1, 2, 4), 1);                         // just reached: .5 s up, .5 s down
+  EXPECT_DOUBLE_EQ(trapezoid_s(5, 2, 4), .5 + 2 + .5);               // and 4 m at 2 m/s between
+}
+
+TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
+  const CellDescription cell = default_cell();
+  const Joints home = home_of(cell);
+  EXPECT_EQ(move_s(cell, home, home), 0);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0, 1);
+  for (int n = 0; n < 1000; ++n) {
+    Joints to = home;
+    double slowest = 0;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      to[i] = cell.axes[i].min + share(random) * (cell.axes[i].max - cell.axes[i].min);
+      slowest = std::max(slowest,
+                         trapezoid_s(std::abs(to[i] - home[i]), cell.axes[i].speed_max, cell.axes[i].acceleration_max));
+    }
+    const double move = move_s(cell, home, to), ticks = move / cell.timing.tick_s;
+    EXPECT_GE(move, slowest - 1e-9);
+    EXPECT_LT(move, slowest + cell.timing.tick_s);
+    EXPECT_NEAR(ticks, std::round(ticks), 1e-6);
+    // The joints on the way agree with the time it takes.
+    const Joints end = joints_during(cell, home, to, move);
+    for (std::size_t i = 0; i < kAxisCount; ++i) EXPECT_NEAR(end[i], to[i], 1e-12);
+  }
+}
+
+TEST(TimeModel, JointsDuringAMoveKeepSpeedAndAcceleration) {
+  const CellDescription cell = default_cell();
+  Joints from = home_of(cell), to = from;
+  to[kJ1] -= 1, to[kJ3] -= .2, to[kRotation] += 2;
+  const double dt = 1e-4;
+  for (double t = dt; t < 1; t += dt) {
+    const Joints a = joints_during(cell, from, to, t - dt), b = joints_during(cell, from, to, t),
+                 c = joints_during(cell, from, to, t + dt);
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      EXPECT_LE(std::abs(b[i] - a[i]) / dt, cell.axes[i].speed_max * (1 + 1e-6));
+      EXPECT_LE(std::abs(c[i] - 2 * b[i] + a[i]) / (dt * dt), cell.axes[i].acceleration_max * (1 + 1e-3));
+    }
+  }
+}
+
+TEST(TimeModel, SettleGrowsUpToItsCap) {
+  const CellDescription cell = default_cell();
+  const auto& timing = cell.timing;
+  const Joints from = home_of(cell);
+  EXPECT_EQ(settle_s(cell, from, from), timing.settle_min_s);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    Joints to = from;
+    to[i] += .5 * cell.axes[i].settle_saturation;
+    EXPECT_NEAR(settle_s(cell, from, to), .5 * (timing.settle_min_s + timing.settle_max_s), 1e-12);
+    to[i] += 10 * cell.axes[i].settle_saturation;
+    EXPECT_EQ(settle_s(cell, from, to), timing.settle_max_s);
+  }
+}
+
+TEST(TimeModel, EstimateAddsUpMovesSettlesAndPulses) {
+  const CellDescription cell = default_cell();
+  const Joints home = home_of(cell);
+  ExposureProgram program;
+  Exposure exposure;
+  exposure.joints = home;
+  exposure.joints[kJ1] -= .3;
+  exposure.pulse_s = .005F;
+  program.exposures = {exposure, exposure};
+  Joints via = home;
+  via[kJ3] -= .05;
+  program.vias = {{0, home}, {1, via}, {2, home}};
+  const TimeSplit time = estimate_time(cell, program);
+  EXPECT_NEAR(time.expose_s, .01, 1e-9);
+  EXPECT_NEAR(time.settle_s, 2 * cell.timing.settle_max_s, 1e-9);
+  EXPECT_NEAR(time.move_s + time.retract_s,
+              2 * move_s(cell, home, exposure.joints) + 2 * move_s(cell, exposure.joints, via), 1e-9);
+}
+
+}  // namespace
+}  // namespace hilbrush
