@@ -14,8 +14,7 @@ struct PlacementOptions {
 };
 
 /// @throws InputError if neither the options nor the file say how large the object is (the sentence names both
-/// options),
-///         if they contradict each other, or if the result has no extent or exceeds 2 m.
+/// options), if they contradict each other, or if the result has no extent or exceeds 2 m.
 TexturedMesh place_on_table(const Model& model, const PlacementOptions& options);
 
 }  // namespace hilbrush

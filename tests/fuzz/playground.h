@@ -64,7 +64,7 @@ inline std::string tga() {
 inline std::string bmp() {
   return "BM" + little(54 + 24, 4) + little(0, 4) + little(54, 4) + little(40, 4) + little(4, 4) + little(2, 4) +
          little(1, 2) + little(24, 2) + little(0, 4) + little(24, 4) + little(2835, 4) + little(2835, 4) +
-         little(0, 8) + pixels();
+         little(0, 4) + little(0, 4) + pixels();
 }
 inline std::string tiff() {
   std::string out = "II" + little(42, 2) + little(8, 4);
