@@ -13,7 +13,7 @@ namespace {
 constexpr double kLeastSlackM = .4e-3;
 /// ... unless it starts nearer, because it was stopped there: then it may leave.
 constexpr double kLeastSlackOfEscapeM = .05e-3;
-constexpr double kBackOffsM[] = {.01, .03, .06, .1};
+constexpr double kBackOffsM[] = {.005, .01, .02, .03, .045, .06, .08, .1};
 
 /// Distance covered `time_s` into a move over `distance` from rest to rest.
 double covered(double distance, const AxisDescription& axis, double time_s) {
@@ -119,7 +119,7 @@ std::optional<Joints> Transit::backed_off(const Joints& joints, double distance_
   const ToolPose tool = kinematics.tool_pose(joints);
   const double yaw = kinematics.yaw(joints);
   const Eigen::Vector3d focus_W = table.to_W(tool.focus_O), beam_W = kinematics.beam_W(yaw);
-  for (double back_m = distance_m; back_m > .004; back_m *= .7) {
+  for (double back_m = distance_m; back_m > .003; back_m *= .7) {
     Joints back = joints;
     if (!kinematics.solve_arm(focus_W - back_m * beam_W, yaw, elbow_of(joints), back)) continue;
     back[kJ4] = kinematics.wind(kJ4, back[kJ4], joints[kJ4]);
@@ -141,21 +141,41 @@ std::optional<std::vector<Joints>> Transit::route(const Joints& from, const Join
     if (!out || !in) continue;
     if (are_clear({from, *out, *in, to})) return std::vector<Joints>{*out, *in};
   }
-  Joints home;
-  for (std::size_t i = 0; i < kAxisCount; ++i) home[i] = reach_.cell.axes[i].home;
-  for (const double back_m : kBackOffsM) {
-    const Joints out = backed_off(from, back_m).value_or(from), in = backed_off(to, back_m).value_or(to);
-    const Joints out_up = lifted(out), in_up = lifted(in);
-    if (!are_clear({from, out, out_up}) || !are_clear({in_up, in, to})) continue;
-    if (is_clear(out_up, in_up)) return std::vector<Joints>{out, out_up, in_up, in};
+  const auto out = retreat(from, true), in = retreat(to, false);
+  if (!out || !in) return std::nullopt;
+  std::vector<Joints> way = *out;
+  if (!is_clear(out->back(), in->back())) {
     // The arm goes home, the table turns, the arm comes back.
-    Joints before = home, after = home;
-    for (const int axis : {kTilt, kRotation}) {
-      before[static_cast<std::size_t>(axis)] = out[static_cast<std::size_t>(axis)];
-      after[static_cast<std::size_t>(axis)] = in[static_cast<std::size_t>(axis)];
-    }
-    if (are_clear({out_up, before, after, in_up})) return std::vector<Joints>{out, out_up, before, after, in_up, in};
+    Joints before = out->back(), after = in->back();
+    for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4}) before[axis] = after[axis] = reach_.cell.axes[axis].home;
+    if (!are_clear({out->back(), before, after, in->back()})) return std::nullopt;
+    way.push_back(before);
+    way.push_back(after);
   }
+  way.insert(way.end(), in->rbegin(), in->rend());
+  return way;
+}
+
+std::optional<std::vector<Joints>> Transit::retreat(const Joints& pose, bool is_outwards) const {
+  const auto is_usable = [&](const std::vector<Joints>& outwards) {
+    std::vector<Joints> way{pose};
+    way.insert(way.end(), outwards.begin(), outwards.end());
+    if (!is_outwards) std::reverse(way.begin(), way.end());
+    return are_clear(way);
+  };
+  // In one go; or in steps, because the axes do not arrive together and the shorter a step, the less it strays from the
+  // beam.
+  std::vector<Joints> steps;
+  for (const double back_m : kBackOffsM) {
+    const auto back = backed_off(pose, back_m);
+    if (!back) continue;
+    if (is_usable({*back, lifted(*back)})) return std::vector<Joints>{*back, lifted(*back)};
+    steps.push_back(*back);
+    std::vector<Joints> stepwise = steps;
+    stepwise.push_back(lifted(*back));
+    if (is_usable(stepwise)) return stepwise;
+  }
+  if (is_usable({lifted(pose)})) return std::vector<Joints>{lifted(pose)};
   return std::nullopt;
 }
 

@@ -25,6 +25,8 @@ class Transit {
   /// The tool drawn back along its beam, as far as `distance_m` or the limits allow; nothing if the arm cannot.
   std::optional<Joints> backed_off(const Joints& joints, double distance_m) const;
   Joints lifted(Joints joints) const;
+  /// Way-points from a pose outwards, the last with the arm lifted; clear in the direction that they will be used in.
+  std::optional<std::vector<Joints>> retreat(const Joints& pose, bool is_outwards) const;
   double least_slack_m(const Joints& from) const;
   bool are_clear(const std::vector<Joints>& way) const;
   /// How far anything on the tool may travel against anything on the table, at most, while the axes move from `a` to
