@@ -200,6 +200,8 @@ fs::path DaemonWorld::model(const std::string& name, std::size_t exposures) {
   ExposureProgram program = small_program(exposures);
   program.provenance = {sha256_hex(name.starts_with("stray") ? "another" : text), settings_hash(),
                         load_cell(options.cell).sha256, "test"};
+  if (name.starts_with("long"))
+    for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
   if (name.starts_with("wild")) program.exposures[exposures / 2].joints[kJ1] = 100;
   write_program(program, folder_ / (name + ".program"));
   const Json report{
