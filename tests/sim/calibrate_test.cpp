@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "sampling/input_error.h"
-#include "test_objects.h"
+#include "tests/sim/test_objects.h"
 
 namespace hilbrush {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "sim/film/beam.h"
-#include "test_objects.h"
+#include "tests/sim/test_objects.h"
 
 namespace hilbrush {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "drivers/driver_error.h"
-#include "test_objects.h"
+#include "tests/sim/test_objects.h"
 
 namespace hilbrush {
 namespace {

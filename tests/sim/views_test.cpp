@@ -8,7 +8,7 @@
 
 #include "sampling/images/image_file.h"
 #include "sim/film/canvas.h"
-#include "test_objects.h"
+#include "tests/sim/test_objects.h"
 
 namespace hilbrush {
 namespace {
