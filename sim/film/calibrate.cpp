@@ -126,7 +126,7 @@ Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOpt
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max) {
   constexpr int kWedgesMax = 6;
   constexpr double kTolerance = .003;
-  const std::vector<double> wanted{0, .05, .1, .2, .3, .4, .5, .6, .7, .8, .9, .95, .98, 1};
+  const std::vector<double> wanted{0, .05, .1, .2, .3, .4, .5, .6, .7, .75, .8, .85, .9, .95, .98, 1};
   std::vector<double> asked;
   for (const double tone : wanted) asked.push_back(tone * asked_max);
 
