@@ -1,6 +1,7 @@
 #include "sampling/images/image_file.h"
 
 #include <OpenImageIO/imageio.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -62,6 +63,27 @@ bool is_truncated_jpeg(std::string_view bytes) {
   using namespace std::string_view_literals;
   const std::size_t scan = bytes.rfind("\xff\xda"sv);
   return scan == std::string_view::npos || bytes.find("\xff\xd9"sv, scan) == std::string_view::npos;
+}
+
+/// What is wrong with a PNG's chain of chunks, or empty. libpng finds out as well, but tells stderr first.
+std::string png_fault(std::string_view bytes) {
+  const auto number = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+    return value;
+  };
+  constexpr std::size_t kFrame = 12;  // length, name, check sum
+  for (std::size_t at = 8; at + kFrame <= bytes.size();) {
+    const std::size_t length = number(at);
+    if (length > bytes.size() - at - kFrame) break;
+    const std::string_view named = bytes.substr(at + 4, 4 + length);
+    if (crc32(0, reinterpret_cast<const Bytef*>(named.data()), static_cast<uInt>(named.size())) !=
+        number(at + 8 + length))
+      return "the PNG picture is corrupt";
+    if (named.substr(0, 4) == "IEND") return "";
+    at += kFrame + length;
+  }
+  return "the PNG picture is truncated";
 }
 
 std::optional<std::string> read_bytes(const path& file, std::size_t limit, std::string& reason) {
@@ -204,6 +226,10 @@ std::optional<Texture> load_image_file(const path& file, std::size_t pixel_limit
     reason = "the JPEG picture is truncated";
     return std::nullopt;
   }
+  if (format == "png") {
+    reason = png_fault(*bytes);
+    if (!reason.empty()) return std::nullopt;
+  }
   if (format == "gif" && gif_pixels(*bytes) > pixel_limit) {
     reason = "it has more pixels than the limit allows (" + std::to_string(pixel_limit) + " left)";
     return std::nullopt;
@@ -213,7 +239,8 @@ std::optional<Texture> load_image_file(const path& file, std::size_t pixel_limit
     OIIO::ImageSpec spec, config;
     config["oiio:UnassociatedAlpha"] = 1;
     if (!input || !input->open(file.string(), spec, config)) {
-      reason = "the " + format + " picture can't be read: " + one_line(input ? input->geterror() : OIIO::geterror());
+      const std::string fault = input ? input->geterror() : OIIO::geterror();
+      reason = "the " + format + " picture can't be read: " + one_line(fault);
       return std::nullopt;
     }
     reason = header_fault(spec, pixel_limit);
