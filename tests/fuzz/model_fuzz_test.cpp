@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 
 #include "sampling/images/image_file.h"
@@ -47,6 +48,11 @@ std::uint64_t number_from_environment(const char* name, std::uint64_t otherwise)
   return text ? std::strtoull(text, nullptr, 10) : otherwise;
 }
 
+/// Nothing here waits, so the processor's time is the operator's on an idle machine, and the same on a busy one.
+double cpu_s() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
 double peak_memory_mb() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)
@@ -79,10 +85,10 @@ void run_campaign(const std::map<std::string, std::string>& seeds, double slice_
     auto pick = seeds.begin();
     std::advance(pick, static_cast<std::ptrdiff_t>(seed % seeds.size()));
     const std::string mutant = mutator.mutate(pick->second, seed);
-    alarm(60);  // a hang ends here, with its seed
-    const auto begin = Clock::now();
+    alarm(kIsSanitized ? 600 : 120);  // what sleeps for ever ends here, with its seed
+    const double begin_s = cpu_s();
     read("mutant" + fs::path(pick->first).extension().string(), mutant, seed);
-    const double took_s = std::chrono::duration<double>(Clock::now() - begin).count();
+    const double took_s = cpu_s() - begin_s;
     alarm(0);
     if (took_s > slowest_s) {
       slowest_s = took_s;
