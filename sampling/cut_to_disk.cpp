@@ -1,9 +1,11 @@
 #include "sampling/cut_to_disk.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <queue>
+#include <tuple>
 #include <utility>
 
 namespace hilbrush {
@@ -11,6 +13,11 @@ namespace {
 
 /// Sides of an outer boundary are split until none is longer than this share of all of it.
 constexpr double kLongestBoundarySide = 1. / 16;
+/// Coarser components are refined: a box of twelve triangles has too few vertices for a smooth map.
+constexpr std::size_t kFewestFaces = 500;
+/// A hole with a longer rim, as a share of the outer one, is joined to it by a cut instead of filled: an open tube
+/// becomes a strip.
+constexpr double kLongestFilledRim = .25;
 
 /// Shortest paths along edges from one vertex to all others.
 struct Distances {
@@ -42,15 +49,38 @@ struct Arcs {
   }
 };
 
-/// Of a closed surface, where every edge has an arc each way.
-Distances distances_from(std::uint32_t source, const Disk& disk, const Arcs& arcs) {
+/// Splits the longest edges until there are enough faces.
+void refine(Disk& disk) {
+  using Entry = std::tuple<double, std::uint32_t, std::uint8_t>;
+  std::priority_queue<Entry> queue;
+  const auto push_sides = [&](std::uint32_t f) {
+    for (std::uint8_t s = 0; s < 3; ++s) queue.push({disk.length({f, s}), f, s});
+  };
+  for (std::uint32_t f = 0; f < disk.faces().size(); ++f) push_sides(f);
+  while (disk.faces().size() < kFewestFaces) {
+    const auto [length, f, s] = queue.top();
+    queue.pop();
+    if (disk.length({f, s}) != length) continue;  // has been split since
+    const TriangleSide across = disk.neighbours()[f][s];
+    const auto first_new = static_cast<std::uint32_t>(disk.faces().size());
+    disk.split_edge({f, s});
+    push_sides(f);
+    if (across != kNoSide) push_sides(across.triangle);
+    for (std::uint32_t added = first_new; added < disk.faces().size(); ++added) push_sides(added);
+  }
+}
+
+/// Along edges, but along a boundary only with its sides.
+Distances distances_from(const std::vector<std::uint32_t>& sources, const Disk& disk, const Arcs& arcs) {
   Distances d;
   d.to_vertex.assign(disk.positions().size(), std::numeric_limits<double>::infinity());
   d.last_side.assign(disk.positions().size(), kNoSide);
-  d.to_vertex[source] = 0;
   using Entry = std::pair<double, std::uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  queue.push({0, source});
+  for (const auto source : sources) {
+    d.to_vertex[source] = 0;
+    queue.push({0, source});
+  }
   while (!queue.empty()) {
     const auto [distance, v] = queue.top();
     queue.pop();
@@ -70,8 +100,8 @@ Distances distances_from(std::uint32_t source, const Disk& disk, const Arcs& arc
 /// Cuts a closed surface of genus 0 open along its approximate diameter. Returns the vertex at one end.
 std::uint32_t cut_along_diameter(Disk& disk) {
   const Arcs arcs(disk);
-  const std::uint32_t one_end = distances_from(0, disk, arcs).farthest();
-  const Distances distances = distances_from(one_end, disk, arcs);
+  const std::uint32_t one_end = distances_from({0}, disk, arcs).farthest();
+  const Distances distances = distances_from({one_end}, disk, arcs);
   std::vector<TriangleSide> path;
   for (std::uint32_t v = distances.farthest(); v != one_end; v = disk.from(path.back()))
     path.push_back(distances.last_side[v]);
@@ -84,6 +114,40 @@ double length_of(const Disk& disk, const BoundaryLoop& loop) {
   double sum = 0;
   for (const TriangleSide s : loop) sum += disk.length(s);
   return sum;
+}
+
+std::vector<std::uint32_t> vertices_of(const Disk& disk, const BoundaryLoop& loop) {
+  std::vector<std::uint32_t> vertices;
+  for (const TriangleSide s : loop) vertices.push_back(disk.from(s));
+  return vertices;
+}
+
+/// Longest loop first.
+std::vector<BoundaryLoop> sorted_loops(const Disk& disk) {
+  std::vector<BoundaryLoop> loops = boundary_loops(disk.neighbours());
+  std::ranges::stable_sort(loops, std::greater<>(), [&](const BoundaryLoop& loop) { return length_of(disk, loop); });
+  return loops;
+}
+
+/// Cuts along the shortest path from the longest loop to each other long one. Returns the places where the cuts end.
+std::vector<Eigen::Vector3d> join_long_rims(Disk& disk) {
+  std::vector<Eigen::Vector3d> ends;
+  const double shortest_joined = kLongestFilledRim * length_of(disk, sorted_loops(disk).front());
+  while (true) {
+    const std::vector<BoundaryLoop> loops = sorted_loops(disk);
+    if (loops.size() < 2 || length_of(disk, loops[1]) < shortest_joined) return ends;
+    const Distances distances = distances_from(vertices_of(disk, loops[0]), disk, Arcs(disk));
+    const auto rim = vertices_of(disk, loops[1]);
+    std::uint32_t v = *std::ranges::min_element(rim, {}, [&](std::uint32_t r) { return distances.to_vertex[r]; });
+    ends.push_back(disk.positions()[v]);
+    std::vector<TriangleSide> path;
+    for (; distances.last_side[v] != kNoSide; v = disk.from(distances.last_side[v]))
+      path.push_back(distances.last_side[v]);
+    ends.push_back(disk.positions()[v]);
+    if (path.empty()) return ends;
+    for (const TriangleSide s : path) disk.cut_edge(s);
+    disk.finish_cuts();
+  }
 }
 
 /// The loop of a disk, beginning at a vertex.
@@ -157,7 +221,7 @@ std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loo
 /// across other edges, longest loops first; each edge that neither tree has closes a loop. Returns the places where
 /// loops meet.
 std::vector<Eigen::Vector3d> cut_handles(Disk& disk) {
-  const Distances distances = distances_from(0, disk, Arcs(disk));
+  const Distances distances = distances_from({0}, disk, Arcs(disk));
   struct Candidate {
     double loop_length;
     TriangleSide side;
@@ -200,31 +264,32 @@ std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& n
     reason = "its triangles do not form a surface";
     return std::nullopt;
   }
-  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0 || component.genus > 0, {}};
-  std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbours());
+  CutDisk cut{
+      Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0 || component.genus > 0, {}};
+  Disk& disk = cut.disk;
+  refine(disk);
+  std::vector<Eigen::Vector3d> forks;
+  std::uint32_t start = 0;
   if (!cut.is_cut) {
-    const auto longest = std::max_element(
-        loops.begin(), loops.end(),
-        [&](const BoundaryLoop& a, const BoundaryLoop& b) { return length_of(cut.disk, a) < length_of(cut.disk, b); });
-    cut.outer = *longest;
-    loops.erase(longest);
-  }
-  for (const BoundaryLoop& loop : loops) cut.disk.fill(loop);
-  if (cut.is_cut) {
-    std::uint32_t start = 0;
-    std::vector<Eigen::Vector3d> forks;
+    forks = join_long_rims(disk);
+    cut.is_cut = !forks.empty();
+    const std::vector<BoundaryLoop> loops = sorted_loops(disk);
+    start = disk.from(loops[0][0]);
+    for (std::size_t i = 1; i < loops.size(); ++i) disk.fill(loops[i]);
+  } else {
+    for (const BoundaryLoop& loop : boundary_loops(disk.neighbours())) disk.fill(loop);
     if (component.genus > 0)
-      forks = cut_handles(cut.disk);
+      forks = cut_handles(disk);
     else
-      start = cut_along_diameter(cut.disk);
-    const std::vector<BoundaryLoop> cuts = boundary_loops(cut.disk.neighbours());
-    if (cuts.size() != 1) {
-      reason = "no cut was found that makes it a disk";
-      return std::nullopt;
-    }
-    cut.outer = component.genus > 0 ? cuts.front() : loop_from(cut.disk, start);
-    cut.forks = vertices_at(cut.disk, cut.outer, forks);
+      start = cut_along_diameter(disk);
   }
+  const std::vector<BoundaryLoop> loops = boundary_loops(disk.neighbours());
+  if (loops.size() != 1) {
+    reason = "no cut was found that makes it a disk";
+    return std::nullopt;
+  }
+  cut.outer = forks.empty() ? loop_from(disk, start) : loops.front();
+  cut.forks = vertices_at(disk, cut.outer, forks);
   split_long_sides(cut);
   return cut;
 }

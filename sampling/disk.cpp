@@ -70,6 +70,12 @@ void Disk::finish_cuts() {
 }
 
 void Disk::fill(const BoundaryLoop& loop) {
+  if (loop.size() == 2) {
+    // A slit: its sides go together again.
+    neighbours_[loop[0].triangle][loop[0].side] = loop[1];
+    neighbours_[loop[1].triangle][loop[1].side] = loop[0];
+    return;
+  }
   const auto centre = static_cast<std::uint32_t>(positions_.size());
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const TriangleSide s : loop) sum += positions_[from(s)];

@@ -37,7 +37,7 @@ class Disk {
   void cut_edge(TriangleSide s);
   /// Gives each fan that the cuts have made a vertex of its own.
   void finish_cuts();
-  /// Closes a boundary loop by a fan of faces without mass.
+  /// Closes a boundary loop by a fan of faces without mass; one of two sides is closed by itself.
   void fill(const BoundaryLoop& loop);
 
  private:

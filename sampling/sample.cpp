@@ -171,9 +171,9 @@ class Placement {
     void take_places(const Patch& patch, double end) {
       for (; index < owner.count_ && owner.place_of(index) < end; ++index) {
         const double share = std::clamp((owner.place_of(index) - at) / patch.mass, 0., 1.);
-        owner.put(index, point_at(owner.curve_.mesh, patch, share), patch.sheet);
+        owner.put(index, point_at(owner.tone_, patch, share), patch.sheet);
       }
-      last_point = point_at_heaviest(patch);
+      last_point = point_in_heaviest(owner.tone_, patch);
       last_sheet = patch.sheet;
     }
     SurfacePoint last_point{};

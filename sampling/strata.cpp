@@ -16,6 +16,7 @@ constexpr int kPlaceDepth = 24;
 constexpr int kCutDepth = 3;
 /// ... and for a dot at a given place along the curve further.
 constexpr int kFinalDepth = 8;
+constexpr int kMostHalvings = 40;
 
 SurfacePoint surface_point(std::uint32_t triangle, const Vector2d& b) {
   return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
@@ -281,20 +282,42 @@ void add_stretch(Stratum& stratum, const TexturedMesh& mesh, const Patch& patch,
   if (moment.mass > 0) part.moment_O += mass / moment.mass * moment.moment;
 }
 
-SurfacePoint point_at_heaviest(const Patch& patch) {
+SurfacePoint point_with_tone(const ToneField& tone, Piece piece) {
+  for (std::uint32_t i = 0; i < piece.corner_count; ++i)
+    piece.corners[i].place = {piece.corners[i].b.x(), piece.corners[i].b.y(), 0};
+  ToneIntegral integral = integrate(tone, piece);
+  SurfacePoint centre = crumb_of(piece, integral).centre;
+  for (int halving = 0; halving < kMostHalvings && !(tone.asked(centre) > 0); ++halving) {
+    Piece lower, upper;
+    cut_piece(piece, halving % 2, centre.barycentric[1 + halving % 2], lower, upper);
+    const ToneIntegral of_lower = integrate(tone, lower), of_upper = integrate(tone, upper);
+    const bool is_lower = of_lower.mass > of_upper.mass;
+    integral = is_lower ? of_lower : of_upper;
+    if (!(integral.mass > 0)) break;
+    piece = is_lower ? lower : upper;
+    centre = crumb_of(piece, integral).centre;
+  }
+  return centre;
+}
+
+SurfacePoint point_in_heaviest(const ToneField& tone, const Patch& patch) {
   std::size_t best = 0;
   for (std::size_t i = 1; i < patch.integrals.size(); ++i)
     if (patch.integrals[i].mass > patch.integrals[best].mass) best = i;
-  return crumb_of(patch.pieces[best], patch.integrals[best]).centre;
+  return point_with_tone(tone, patch.pieces[best]);
 }
 
-SurfacePoint point_at(const TexturedMesh& mesh, const Patch& patch, double share) {
-  if (patch.is_uniform)
-    return lift(patch,
-                Vector3d(patch.box.low.x(), patch.box.low.y(), 0) + patch.box.size * hilbert_place(patch.quad, share));
-  PatchCut cut(mesh, patch);
-  cut.follow(patch, share * patch.mass, kFinalDepth);
-  return cut.last().centre;
+SurfacePoint point_at(const ToneField& tone, const Patch& patch, double share) {
+  SurfacePoint point;
+  if (patch.is_uniform) {
+    const Vector3d place = patch.box.size * hilbert_place(patch.quad, share);
+    point = lift(patch, Vector3d(patch.box.low.x(), patch.box.low.y(), 0) + place);
+  } else {
+    PatchCut cut(tone.mesh(), patch);
+    cut.follow(patch, share * patch.mass, kFinalDepth);
+    point = cut.last().centre;
+  }
+  return tone.asked(point) > 0 ? point : point_in_heaviest(tone, patch);
 }
 
 }  // namespace hilbrush

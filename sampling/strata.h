@@ -34,11 +34,15 @@ struct Stratum {
 /// Adds the stretch of a patch between two shares of its mass, 0 <= from <= to <= 1.
 void add_stretch(Stratum& stratum, const TexturedMesh& mesh, const Patch& patch, double from, double to);
 
-/// The surface point where the curve has passed `share` of the patch's mass.
-SurfacePoint point_at(const TexturedMesh& mesh, const Patch& patch, double share);
+/// The surface point where the curve has passed `share` of the patch's mass, or, where that is blank, one nearby that
+/// is not.
+SurfacePoint point_at(const ToneField& tone, const Patch& patch, double share);
 
-/// The centre of the patch's heaviest piece.
-SurfacePoint point_at_heaviest(const Patch& patch);
+/// A point of the piece that asks for dots, by halving it towards its mass.
+SurfacePoint point_with_tone(const ToneField& tone, Piece piece);
+
+/// A point with tone in the patch's heaviest piece.
+SurfacePoint point_in_heaviest(const ToneField& tone, const Patch& patch);
 
 /// Integral of the Hilbert curve's place over its first `share`, in a unit square (z = 0).
 Eigen::Vector3d hilbert_moment(HilbertQuad quad, double share);

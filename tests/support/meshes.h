@@ -103,7 +103,7 @@ inline TexturedMesh needle_cylinder() {
   return cylinder(.02, .05, 720, 1);
 }
 inline TexturedMesh even_cylinder() {
-  return cylinder(.02, .05, 720, 288);
+  return cylinder(.02, .05, 180, 72);
 }
 
 inline TexturedMesh moebius_strip(int nu = 60) {

@@ -1,0 +1,247 @@
+#include "sampling/sample.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "sampling/input_error.h"
+#include "sampling/mesh_repair.h"
+#include "sampling/patch_walk.h"
+#include "sampling/surface_curve.h"
+#include "tests/support/meshes.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector3d;
+
+SampleOptions options_for(std::uint64_t count, Sampler sampler = Sampler::kCentroid) {
+  SampleOptions options;
+  options.dot_count = count;
+  options.sampler = sampler;
+  return options;
+}
+
+DotSequence sample(const TexturedMesh& mesh, const SampleOptions& options, SampleReport* report = nullptr) {
+  const SurfaceCurve curve(mesh);
+  const ToneField tone(mesh, {});
+  return place_dots(curve, tone, options, report);
+}
+
+double largest_jump(const DotSequence& sequence) {
+  double largest = 0;
+  for (std::size_t i = 1; i < sequence.dots.size(); ++i)
+    largest = std::max(largest, (sequence.dots[i].position_O - sequence.dots[i - 1].position_O).norm());
+  return largest / sequence.pitch_m;
+}
+
+/// Distance from each dot to the nearest other one, in pitches, sorted. The order along the curve makes a simple search
+/// by x enough.
+std::vector<double> nearest_distances(const DotSequence& sequence) {
+  std::vector<Vector3d> p;
+  for (const Dot& dot : sequence.dots) p.push_back(dot.position_O);
+  std::sort(p.begin(), p.end(), [](const Vector3d& a, const Vector3d& b) { return a.x() < b.x(); });
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    double best = 1e300;
+    for (std::size_t j = i + 1; j < p.size() && p[j].x() - p[i].x() < best; ++j)
+      best = std::min(best, (p[j] - p[i]).norm());
+    for (std::size_t j = i; j-- > 0 && p[i].x() - p[j].x() < best;) best = std::min(best, (p[j] - p[i]).norm());
+    distances.push_back(best / sequence.pitch_m);
+  }
+  std::sort(distances.begin(), distances.end());
+  return distances;
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+void visit_patches(const SurfaceCurve& curve, const ToneField& tone, const PatchRule& rule, const PatchVisitor& visit) {
+  const auto& implementation = curve.implementation();
+  for (std::uint32_t s = 0; s < implementation.sheets.size(); ++s)
+    for (const BaseQuad& quad : implementation.sheets[s].base_quads)
+      walk_patches(implementation.sheets[s], s, quad, tone, rule, mass_of(implementation.sheets[s], quad, tone), visit);
+}
+
+TEST(Sample, PatchesCoverTheSurfaceOnceWhateverTheMesh) {
+  for (const auto& [name, awkward] : test::awkward_meshes()) {
+    SCOPED_TRACE(name);
+    const TexturedMesh mesh = repair_mesh(awkward).mesh;
+    const SurfaceCurve curve(mesh);
+    const ToneField tone(mesh, {});
+    double area = 0, mass = 0;
+    visit_patches(curve, tone, {mesh.area_m2() / 500, 4}, [&](const Patch& patch) {
+      mass += patch.mass;
+      for (const ToneIntegral& integral : patch.integrals) area += integral.area_m2;
+    });
+    EXPECT_NEAR(area / mesh.area_m2(), 1, 1e-9);
+    EXPECT_NEAR(mass / mesh.area_m2(), 1, 1e-9);
+  }
+}
+
+TEST(Sample, ExactCountsOnEveryAwkwardMeshWithEverySampler) {
+  for (const auto& [name, awkward] : test::awkward_meshes()) {
+    const TexturedMesh mesh = repair_mesh(awkward).mesh;
+    const SurfaceCurve curve(mesh);
+    const ToneField tone(mesh, {});
+    for (const Sampler sampler : {Sampler::kCentroid, Sampler::kJittered, Sampler::kEven, Sampler::kRandom})
+      for (const std::uint64_t count : {1, 2, 37, 1000}) {
+        const DotSequence sequence = place_dots(curve, tone, options_for(count, sampler));
+        ASSERT_EQ(sequence.dots.size(), count) << name;
+        for (const Dot& dot : sequence.dots) {
+          ASSERT_NEAR(dot.normal_O.norm(), 1, 1e-5) << name;
+          ASSERT_NEAR(dot.smooth_normal_O.norm(), 1, 1e-5) << name;
+          ASSERT_LT(dot.triangle, mesh.triangle_count());
+          const Vector3d offset = dot.position_O - mesh.corner(dot.triangle, 0);
+          ASSERT_NEAR(offset.dot(mesh.area_vector(dot.triangle).normalized()), 0, 1e-9) << name << ": off the surface";
+          ASSERT_LT(dot.component, curve.components().size());
+        }
+      }
+  }
+}
+
+/// A ramp from white to black: bilinear between texels it is linear, so that the mass of any polygon has a closed form.
+TexturedMesh ramp() {
+  TexturedMesh mesh =
+      test::with_texture(test::rectangle(.04, .04, 3, 3), 64, 4, [](int i, int) { return 1 - (i + .5) / 64; });
+  for (auto& corners : mesh.corner_uv)
+    for (Eigen::Vector2d& uv : corners) uv = Eigen::Vector2d(.05 + .9 * uv.x(), uv.y());
+  return mesh;
+}
+
+TEST(Sample, EveryStratumHasItsMass) {
+  const TexturedMesh mesh = ramp();
+  const SurfaceCurve curve(mesh);
+  const ToneField tone(mesh, {});
+  const double total = .5 * mesh.area_m2(), dot_mass = total / 3000;
+  double passed = 0, exact = 0, worst = 0;
+  visit_patches(curve, tone, {dot_mass, 4}, [&](const Patch& patch) {
+    passed += patch.mass;
+    for (const Piece& piece : patch.pieces)
+      for (std::uint32_t i = 2; i < piece.corner_count; ++i) {
+        const auto place = [&](std::uint32_t k) {
+          const Eigen::Vector2d& b = piece.corners[k].b;
+          return position(mesh, {piece.triangle, {1 - b.sum(), b.x(), b.y()}});
+        };
+        const Vector3d a = place(0), b = place(i - 1), c = place(i);
+        const double x = (a.x() + b.x() + c.x()) / 3 / .04;
+        exact += .5 * (b - a).cross(c - a).norm() * (.05 + .9 * x);
+      }
+    worst = std::max(worst, std::abs(passed - exact) / dot_mass);
+  });
+  EXPECT_NEAR(passed / total, 1, 1e-6);
+  EXPECT_LT(worst, 1e-5) << "dots; errors would add up along the curve";
+}
+
+TEST(Sample, DotsFollowTheTone) {
+  const TexturedMesh mesh = ramp();
+  const DotSequence sequence = sample(mesh, options_for(20000));
+  std::array<double, 10> counts{};
+  for (const Dot& dot : sequence.dots) counts[static_cast<std::size_t>(std::min(9., dot.position_O.x() / .004))] += 1;
+  for (std::size_t k = 0; k < 10; ++k) {
+    const double tone = .05 + .9 * (static_cast<double>(k) + .5) / 10;
+    EXPECT_NEAR(counts[k] / 20000, tone / 5, .0015) << k;
+  }
+}
+
+TEST(Sample, PitchAndCountSayTheSame) {
+  const TexturedMesh mesh = test::sphere(.02);
+  SampleOptions options;
+  options.pitch_m = .000254;
+  const DotSequence by_pitch = sample(mesh, options);
+  EXPECT_EQ(by_pitch.dots.size(), static_cast<std::size_t>(std::lround(mesh.area_m2() / (.000254 * .000254))));
+  EXPECT_NEAR(sample(mesh, options_for(by_pitch.dots.size())).pitch_m, .000254, 1e-8);
+}
+
+TEST(Sample, NoLongJumpsOnMappedSurfaces) {
+  for (const char* name : {"sphere", "cube", "long strip", "needle cylinder"}) {
+    SampleReport report;
+    const DotSequence sequence = sample(repair_mesh(test::awkward_meshes().at(name)).mesh, options_for(8000), &report);
+    EXPECT_LT(largest_jump(sequence), 5) << name;
+    EXPECT_LT(report.path_constant, 1.1) << name;
+  }
+}
+
+TEST(Sample, SameBytesForAnyNumberOfThreads) {
+  const TexturedMesh mesh = test::with_texture(
+      test::torus(), 64, 64, [](int i, int j) { return .5 + .5 * std::sin(.3 * i) * std::cos(.2 * j); });
+  for (const Sampler sampler : {Sampler::kCentroid, Sampler::kJittered, Sampler::kRandom}) {
+    std::vector<DotSequence> results;
+    for (const std::size_t threads : {1, 2, 5}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      results.push_back(sample(mesh, options_for(5000, sampler)));
+    }
+    for (const DotSequence& other : results)
+      for (std::size_t i = 0; i < 5000; ++i) {
+        ASSERT_EQ(other.dots[i].position_O, results[0].dots[i].position_O) << i;
+        ASSERT_EQ(other.dots[i].triangle, results[0].dots[i].triangle) << i;
+      }
+  }
+}
+
+TEST(Sample, SeedsDiffer) {
+  const TexturedMesh mesh = test::sphere(.02);
+  SampleOptions options = options_for(500, Sampler::kJittered);
+  const DotSequence one = sample(mesh, options);
+  options.seed = 2;
+  const DotSequence two = sample(mesh, options);
+  std::size_t equal = 0;
+  for (std::size_t i = 0; i < 500; ++i) equal += one.dots[i].position_O == two.dots[i].position_O;
+  EXPECT_LT(equal, 5u);
+}
+
+TEST(Sample, BlankSurfaceGetsNoDots) {
+  // Black bars, one texel in eight: hardly a stratum's centre lies on one by itself.
+  const TexturedMesh mesh = test::with_texture(
+      test::rectangle(.04, .04, 3, 3), 64, 64, [](int i, int) { return i % 8 == 3 ? 0. : 1.; }, false, false);
+  for (const Sampler sampler : {Sampler::kCentroid, Sampler::kJittered, Sampler::kEven, Sampler::kRandom})
+    for (const std::uint64_t count : {50, 700, 20000}) {
+      const DotSequence sequence = sample(mesh, options_for(count, sampler));
+      std::size_t blank = 0;
+      for (const Dot& dot : sequence.dots) blank += dot.tone <= 0;
+      EXPECT_EQ(blank, 0u) << count << " dots, sampler " << static_cast<int>(sampler);
+    }
+}
+
+TEST(Sample, NeedlesPaintAsWellAsEvenTriangles) {
+  const auto needles = nearest_distances(sample(test::needle_cylinder(), options_for(10000)));
+  const auto even = nearest_distances(sample(test::even_cylinder(), options_for(10000)));
+  EXPECT_NEAR(mean(needles), mean(even), .02);
+  EXPECT_NEAR(needles[100], even[100], .08) << "the nearest percent";
+  EXPECT_GT(needles[100], .45);
+}
+
+TEST(Sample, CentroidsSpreadBetterThanJitterAndJitterThanRandom) {
+  const TexturedMesh mesh = test::rectangle(.05, .05, 7, 7);
+  const auto centroid = nearest_distances(sample(mesh, options_for(6000, Sampler::kCentroid)));
+  const auto jittered = nearest_distances(sample(mesh, options_for(6000, Sampler::kJittered)));
+  const auto random = nearest_distances(sample(mesh, options_for(6000, Sampler::kRandom)));
+  EXPECT_GT(mean(centroid), .78);
+  EXPECT_GT(mean(centroid), mean(jittered) + .15);
+  EXPECT_NEAR(mean(random), .5, .02) << "of a Poisson process";
+  EXPECT_GT(mean(jittered), mean(random) + .03);
+  EXPECT_GT(centroid.front(), .3) << "no two dots coincide";
+}
+
+TEST(Sample, RefusesWhatItCannotDo) {
+  const TexturedMesh white = test::finish(test::sphere(.02));
+  TexturedMesh blank = white;
+  for (auto& corners : blank.corner_luminance) corners.fill(1);
+  EXPECT_THROW(sample(blank, options_for(100)), InputError);
+  EXPECT_THROW(sample(white, SampleOptions{}), InputError);
+  SampleOptions both = options_for(100);
+  both.pitch_m = .001;
+  EXPECT_THROW(sample(white, both), InputError);
+  SampleOptions many = options_for(1000);
+  many.dot_limit = 999;
+  EXPECT_THROW(sample(white, many), InputError);
+}
+
+}  // namespace
+}  // namespace hilbrush
