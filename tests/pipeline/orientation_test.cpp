@@ -189,12 +189,15 @@ std::vector<int> paint_and_read(const std::string& file, const char* up) {
     const Eigen::Vector3d normal_O = in_object(kFaces[k].normal_F);
     const Reading reading =
         read_letter(read_face(film, normal_O, in_object(kFaces[k].right_F), in_object(kFaces[k].up_F)));
-    // Only the face that the cube stands on is out of the beam's reach.
-    EXPECT_EQ(reading.is_painted, normal_O.z() > -.5) << file << ", " << up << " up: " << kFaces[k].name;
+    // The face that the cube stands on is reached from below as far as the table tilts: what is there must be right,
+    // but needs not be there.
+    const bool is_underside = normal_O.z() < -.5;
+    EXPECT_TRUE(reading.is_painted || is_underside) << file << ", " << up << " up: " << kFaces[k].name;
     if (!reading.is_painted) continue;
     painted.push_back(static_cast<int>(k) + 1);
     EXPECT_EQ(reading.best_way, 0) << file << ", " << up << " up: the letter on the " << kFaces[k].name
                                    << " lies in way " << reading.best_way;
+    if (is_underside) continue;
     EXPECT_GT(reading.as_it_should, .75) << file << ", " << up << " up: " << kFaces[k].name;
     EXPECT_GT(reading.as_it_should, reading.best_other + .3) << file << ", " << up << " up: " << kFaces[k].name;
     EXPECT_EQ(reading.number, static_cast<int>(k) + 1)
@@ -208,9 +211,9 @@ class Orientation : public testing::TestWithParam<const char*> {};
 TEST_P(Orientation, LettersStandUprightAndUnmirroredOnEveryFace) {
   // Standing as the format has it, and tipped over: together every face is painted once at least.
   std::vector<int> painted = paint_and_read(GetParam(), "y");
-  EXPECT_EQ(painted.size(), 5u);
+  EXPECT_GE(painted.size(), 5u);
   const std::vector<int> tipped = paint_and_read(GetParam(), "z");
-  EXPECT_EQ(tipped.size(), 5u);
+  EXPECT_GE(tipped.size(), 5u);
   painted.insert(painted.end(), tipped.begin(), tipped.end());
   for (int k = 1; k <= 6; ++k)
     EXPECT_NE(std::find(painted.begin(), painted.end(), k), painted.end()) << "face " << k << " was never painted";
