@@ -80,10 +80,12 @@ Eigen::Isometry3d CheckCell::X_OF(const Joints& joints) const {
   return X_WO.inverse() * X_WF;
 }
 
-std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const {
-  const Eigen::Vector3d focus = focus_O(X_OF), beam = beam_O(X_OF);
+/// How far before the focus the first surface is that a ray from the lens, `aside_O` of the beam, meets; nothing if it
+/// meets none.
+std::optional<double> CheckCell::lands_short_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
+                                               const Eigen::Vector3d& aside_O, double beyond_m) const {
   const double length_m = cell_.lens.far_m;
-  const Eigen::Vector3f from = (focus - length_m * beam).cast<float>(), along = beam.cast<float>();
+  const Eigen::Vector3f from = (focus_O + aside_O - length_m * beam_O).cast<float>(), along = beam_O.cast<float>();
   RTCRayHit ray{};
   ray.ray.org_x = from.x();
   ray.ray.org_y = from.y();
@@ -91,15 +93,30 @@ std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double toleranc
   ray.ray.dir_x = along.x();
   ray.ray.dir_y = along.y();
   ray.ray.dir_z = along.z();
-  ray.ray.tfar = static_cast<float>(length_m + 1.5 * tolerance_m);
+  ray.ray.tfar = static_cast<float>(length_m + beyond_m);
   ray.ray.mask = ~0u;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(rays_->scene, &context, &ray);
-  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return "the beam misses the object";
-  const double short_m = length_m - static_cast<double>(ray.ray.tfar);
-  if (std::abs(short_m) > tolerance_m) return "the object blocks the beam " + millimetres(short_m) + " before the dot";
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return length_m - static_cast<double>(ray.ray.tfar);
+}
+
+std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const {
+  const Eigen::Vector3d focus = focus_O(X_OF), beam = beam_O(X_OF);
+  const double length_m = cell_.lens.far_m;
+  const auto lands = [&](const std::optional<double>& short_m) { return short_m && std::abs(*short_m) <= tolerance_m; };
+  const auto short_m = lands_short_m(focus, beam, Eigen::Vector3d::Zero(), 1.5 * tolerance_m);
+  if (!lands(short_m)) {
+    // A dot on an edge is met or missed by rounding: then one of the rays close by decides.
+    const Eigen::Vector3d u = .3 * tolerance_m * beam.unitOrthogonal(), v = beam.cross(u);
+    bool is_met = false;
+    for (const Eigen::Vector3d& aside : {u, v, Eigen::Vector3d(-u), Eigen::Vector3d(-v)})
+      is_met = is_met || lands(lands_short_m(focus, beam, aside, 1.5 * tolerance_m));
+    if (!is_met && !short_m) return "the beam misses the object";
+    if (!is_met) return "the object blocks the beam " + millimetres(*short_m) + " before the dot";
+  }
   for (int i = 1; i <= 100; ++i)
     if (is_in_table(focus - (.01 * i * length_m) * beam)) return "the table blocks the beam";
   return {};

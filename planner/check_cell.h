@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "planner/cell_description.h"
@@ -37,6 +38,8 @@ class CheckCell {
     Eigen::Vector3d from_F, axis_F;
     double length_m, radius_m;
   };
+  std::optional<double> lands_short_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
+                                      const Eigen::Vector3d& aside_O, double beyond_m) const;
   bool touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OF) const;
   bool touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OF) const;
   bool is_in_table(const Eigen::Vector3d& p_O) const;

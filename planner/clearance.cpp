@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace hilbrush {
 namespace {
@@ -10,6 +11,8 @@ namespace {
 /// The ray starts this far from the dot: above the rounding of single precision, below any error that could be seen on
 /// the film.
 constexpr double kBeamStartM = 2e-6;
+/// The beam passes edges at this distance at least, except right at the dot, where its own surface is that near.
+constexpr double kBeamRadiusM = 20e-6, kSideBeamStartM = .3e-3;
 /// The beam passes post and plate at this distance at least.
 constexpr double kBeamTableGapM = .3e-3;
 constexpr double kQuillLengthM = .25;
@@ -37,6 +40,12 @@ double Clearance::table_distance_m(const Eigen::Vector3d& p_O) const {
 
 Obstruction Clearance::beam_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
   if (rays_.is_blocked(focus_O, -beam_O, kBeamStartM, cell_.lens.far_m)) return Obstruction::kBeamObject;
+  // What passes an edge by less than this passes it by rounding alone.
+  const Eigen::Vector3d u = beam_O.unitOrthogonal(), v = beam_O.cross(u);
+  for (const auto& [along_u, along_v] : {std::pair{1., 0.}, {-.5, .866}, {-.5, -.866}})
+    if (rays_.is_blocked(focus_O + kBeamRadiusM * (along_u * u + along_v * v), -beam_O, kSideBeamStartM,
+                         cell_.lens.far_m))
+      return Obstruction::kBeamObject;
   // From the dot towards the lens in steps of the free distance. A dot that itself is nearer to the post than the gap
   // only has to get away from it.
   double free_m = table_distance_m(focus_O);
