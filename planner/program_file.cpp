@@ -203,7 +203,7 @@ Header read_header(std::istream& in, const std::filesystem::path& file, Sha256& 
 
   std::string_view rest = std::string_view(bytes).substr(kMagic.size());
   expected_hash = take_line(rest, kHashKey, file);
-  const Header header = parse_header(rest, file);
+  Header header = parse_header(rest, file);
   const std::string text = header_text(header);
   if (!rest.starts_with(text)) refuse(file, "its header is damaged");
   hash.update(text);
