@@ -17,7 +17,7 @@ constexpr double kLongestBoundarySide = 1. / 16;
 constexpr std::size_t kFewestFaces = 500;
 /// A hole with a longer rim, as a share of the outer one, is joined to it by a cut instead of filled: an open tube
 /// becomes a strip.
-constexpr double kLongestFilledRim = .25;
+constexpr double kLongestFilledRim = .6;
 
 /// Shortest paths along edges from one vertex to all others.
 struct Distances {

@@ -56,23 +56,48 @@ std::vector<double> lengths_along(const CutDisk& cut) {
   return along;
 }
 
+std::array<double, 4> side_lengths(const Corners& corners, const std::vector<double>& along) {
+  std::array<double, 4> sides{};
+  for (std::size_t k = 0; k < 3; ++k) sides[k] = along[corners[k + 1]] - along[corners[k]];
+  sides[3] = along.back() - along[corners[3]] + along[corners[0]];
+  return sides;
+}
+
+/// Adds the place nearest to the middle of the longest stretch between two corners.
+void add_middle_of_longest(std::vector<std::size_t>& corners, const std::vector<double>& along) {
+  const std::size_t n = along.size() - 1;
+  const auto at = [&](std::size_t i) { return along[i % n] + (i >= n ? along.back() : 0); };
+  const auto end_of = [&](std::size_t k) { return k + 1 < corners.size() ? corners[k + 1] : corners[0] + n; };
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < corners.size(); ++k)
+    if (at(end_of(k)) - at(corners[k]) > at(end_of(longest)) - at(corners[longest])) longest = k;
+  const double middle = .5 * (at(corners[longest]) + at(end_of(longest)));
+  std::size_t best = corners[longest] + 1;
+  for (std::size_t i = best; i < end_of(longest); ++i)
+    if (std::abs(at(i) - middle) < std::abs(at(best) - middle)) best = i;
+  corners.push_back(best % n);
+  std::sort(corners.begin(), corners.end());
+}
+
+/// The shape's own corners, sharpest first; a shape with fewer than four gets the others in the middle of its longest
+/// sides.
 std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<double>& along) {
   std::vector<double> turn(cut.disk.positions().size(), std::numbers::pi);
   for (std::uint32_t f = 0; f < cut.disk.faces().size(); ++f)
     for (std::size_t c = 0; c < 3; ++c) turn[cut.disk.faces()[f][c]] -= angle_at(cut.disk, f, c);
-  std::vector<std::size_t> order(cut.outer.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return turn[cut.disk.from(cut.outer[a])] > turn[cut.disk.from(cut.outer[b])] + 1e-9;
-  });
-  Corners corners{order[0], order[1], order[2], order[3]};
-  if (turn[cut.disk.from(cut.outer[corners[3]])] < kShapeCornerTurn_rad) return std::nullopt;
-  std::sort(corners.begin(), corners.end());
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double length =
-        k < 3 ? along[corners[k + 1]] - along[corners[k]] : along.back() - along[corners[3]] + along[corners[0]];
-    if (length < kLeastSideShare * along.back()) return std::nullopt;
-  }
+  const auto turn_at = [&](std::size_t i) { return turn[cut.disk.from(cut.outer[i])]; };
+  std::vector<std::size_t> sharp;
+  for (std::size_t i = 0; i < cut.outer.size(); ++i)
+    if (turn_at(i) >= kShapeCornerTurn_rad) sharp.push_back(i);
+  if (sharp.empty()) return std::nullopt;
+  std::stable_sort(sharp.begin(), sharp.end(),
+                   [&](std::size_t a, std::size_t b) { return turn_at(a) > turn_at(b) + 1e-9; });
+  if (sharp.size() > 4) sharp.resize(4);
+  std::sort(sharp.begin(), sharp.end());
+  while (sharp.size() < 4) add_middle_of_longest(sharp, along);
+  const Corners corners{sharp[0], sharp[1], sharp[2], sharp[3]};
+  const auto sides = side_lengths(corners, along);
+  if (*std::min_element(sides.begin(), sides.end()) < kLeastSideShare * along.back()) return std::nullopt;
   return corners;
 }
 
@@ -86,13 +111,6 @@ Corners corners_by_length(const std::vector<double>& along) {
     corners[k] = std::min(std::max(nearest, k == 0 ? 0 : corners[k - 1] + 1), n - 4 + k);
   }
   return corners;
-}
-
-std::array<double, 4> side_lengths(const Corners& corners, const std::vector<double>& along) {
-  std::array<double, 4> sides{};
-  for (std::size_t k = 0; k < 3; ++k) sides[k] = along[corners[k + 1]] - along[corners[k]];
-  sides[3] = along.back() - along[corners[3]] + along[corners[0]];
-  return sides;
 }
 
 /// Four of the forks so that opposite sides are alike and none is short.
