@@ -165,7 +165,7 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
     if (along < 0 || along > body.length_m) return false;
     return (p_O - from_O - along * axis_O).norm() < body.radius_m;
   };
-  constexpr int kRimPoints = 36, kAxisPoints = 20;
+  constexpr int kRimPoints = 36, kMantleLines = 12, kAxisPoints = 20;
   for (int i = 0; i < kRimPoints; ++i) {
     const double angle = 2 * std::numbers::pi * i / kRimPoints, r = cell_.table.plate_radius_m;
     const Eigen::Vector3d rim(r * std::cos(angle), r * std::sin(angle), -post);
@@ -174,8 +174,8 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
   for (int i = 0; i <= kAxisPoints; ++i)
     if (is_in_body({0, 0, -post * i / kAxisPoints})) return true;
   const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
-  for (int i = 0; i < kRimPoints / 3; ++i) {
-    const double angle = 2 * std::numbers::pi * i / (kRimPoints / 3);
+  for (int i = 0; i < kMantleLines; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kMantleLines;
     const Eigen::Vector3d rim_O = from_O + body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
     for (int k = 0; k <= kAxisPoints; ++k)
       if (is_in_table(rim_O + (body.length_m * k / kAxisPoints) * axis_O)) return true;
