@@ -100,6 +100,17 @@ std::size_t file_bytes(std::size_t count) {
   return kPage + window_table_bytes(count) + round_up(count * sizeof(std::uint64_t));
 }
 
+/// A process that was forked a moment ago shares our locks until it executes its program or dies: a lock is given a
+/// second to become free.
+bool lock_exclusively(int fd) {
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return true;
+    if (errno != EWOULDBLOCK && errno != EINTR) return false;
+    ::usleep(10000);
+  }
+  return false;
+}
+
 void sync_folder(const std::filesystem::path& file) {
   const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -243,7 +254,7 @@ Journal Journal::create(const std::filesystem::path& file, std::size_t exposure_
   try {
     if (const int error = ::posix_fallocate(journal->fd, 0, static_cast<off_t>(journal->byte_count)); error != 0)
       fail(file, std::string("no room for the journal: ") + std::strerror(error));
-    if (::flock(journal->fd, LOCK_EX | LOCK_NB) != 0) fail_errno(file, "is in use");
+    if (!lock_exclusively(journal->fd)) fail_errno(file, "is in use");
     journal->map();
     journal->find_tables();
     Header header{};
@@ -276,7 +287,7 @@ Journal Journal::open(const std::filesystem::path& file, const std::string& prog
   journal->file = file;
   journal->fd = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
   if (journal->fd < 0) fail_errno(file, "can't be opened");
-  if (::flock(journal->fd, LOCK_EX | LOCK_NB) != 0) fail(file, "is in use by another program");
+  if (!lock_exclusively(journal->fd)) fail(file, "is in use by another program");
   struct stat status {};
   if (::fstat(journal->fd, &status) != 0) fail_errno(file, "can't be read");
   if (status.st_size < static_cast<off_t>(kPage)) fail(file, "is no journal: it is too short");

@@ -183,21 +183,20 @@ Joints CellThread::true_joints() const {
 CellThread::Loaded CellThread::load(const PaintOrder& order, bool may_create) const {
   const auto program_file = order.folder / "program.ply";
   const auto journal_file = order.folder / "journal";
+  ExposureProgram program;
   try {
-    ExposureProgram program = read_program(program_file);
-    check_provenance(program.provenance, order, description_);
-    const std::string sha256 = file_sha256(program_file);
-    Journal journal = may_create && !std::filesystem::exists(journal_file)
-                          ? Journal::create(journal_file, program.exposures.size(), sha256)
-                          : Journal::open(journal_file, sha256);
-    if (journal.exposure_count() != program.exposures.size())
-      throw JobFilesFault("the journal does not fit the program");
-    return {std::move(program), std::move(journal), {}};
-  } catch (const JobFilesFault&) {
-    throw;
-  } catch (const std::exception& error) {
+    program = read_program(program_file);
+  } catch (const ProgramFileError& error) {
     throw JobFilesFault(error.what());
   }
+  check_provenance(program.provenance, order, description_);
+  const std::string sha256 = file_sha256(program_file);
+  // What is wrong with a journal may be mended; the job stays resumable.
+  const bool is_new = may_create && !std::filesystem::exists(journal_file);
+  Journal journal =
+      is_new ? Journal::create(journal_file, program.exposures.size(), sha256) : Journal::open(journal_file, sha256);
+  if (journal.exposure_count() != program.exposures.size()) throw JobFilesFault("the journal does not fit the program");
+  return {std::move(program), std::move(journal), {}};
 }
 
 PaintTally CellThread::tally(const Loaded& loaded) {

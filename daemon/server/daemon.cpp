@@ -33,7 +33,11 @@ class LockFile {
   LockFile(const fs::path& file, const std::string& held)
       : fd_(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640)) {
     if (fd_ < 0) throw std::runtime_error(file.string() + ": can't be opened: " + std::strerror(errno));
-    if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
+    // A child of a daemon that was killed may hold its lock for a moment longer.
+    for (int attempt = 0; attempt < 50; ++attempt) {
+      if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
+      ::usleep(10000);
+    }
     ::close(fd_);
     throw std::runtime_error(held + ": another hilbrushd uses it");
   }

@@ -482,6 +482,7 @@ Job& JobBook::pause(const std::string& id) {
   Job& job = get(id);
   if (job.state != JobState::kPainting) forbid(job, "only a job that is being painted can be paused");
   thread_.pause();
+  if (leave_approach(ExecutionOutcome::kPaused, "")) return job;
   job.stage = "pausing";
   changed(job, false);
   return job;
@@ -493,6 +494,7 @@ Job& JobBook::cancel(const std::string& id) {
   if (job.state == JobState::kPainting) {
     run_->is_cancelled = true;
     thread_.pause();
+    if (leave_approach(ExecutionOutcome::kPaused, "")) return job;
     job.stage = "cancelling";
     changed(job, false);
     return job;
@@ -507,13 +509,19 @@ Job& JobBook::cancel(const std::string& id) {
   return job;
 }
 
-/// While the executor runs, its own end tells; while the approach is planned, nothing else would.
 void JobBook::handle_stop() {
-  if (!run_ || run_->phase != PaintRun::Phase::kApproaching) return;
+  leave_approach(ExecutionOutcome::kStopped, "the cell was stopped");
+}
+
+/// While the executor runs, its own end tells how the run ended; while the approach is planned, nothing else would.
+/// True if it was.
+bool JobBook::leave_approach(ExecutionOutcome outcome, const std::string& reason) {
+  if (!run_ || run_->phase != PaintRun::Phase::kApproaching) return false;
   if (run_->child) children_.cancel(*run_->child);
   thread_.release();
   const Job& job = jobs_.at(run_->job);
-  finish_run({ExecutionOutcome::kStopped, "the cell was stopped", false, 0, 0}, {job.exposed, job.in_doubt});
+  finish_run({outcome, reason, false, 0, 0}, {job.exposed, job.in_doubt});
+  return true;
 }
 
 }  // namespace hilbrush

@@ -98,6 +98,7 @@ class JobBook {
   void finish_run(const ExecutionResult& result, const PaintTally& tally);
   void take_tally(Job& job, const PaintTally& tally);
   void handle_stop();
+  bool leave_approach(ExecutionOutcome outcome, const std::string& reason);
   void inspect_next();
 
   Place place_;

@@ -49,7 +49,9 @@ std::unique_ptr<SQLite::Database> open_checked(const std::filesystem::path& file
   if (const std::string answer = database->execAndGet("PRAGMA quick_check").getString(); answer != "ok")
     throw std::runtime_error("it is damaged: " + answer);
   database->exec("PRAGMA journal_mode = WAL");
-  database->exec("PRAGMA synchronous = FULL");
+  // No sync a commit: the socket thread must not wait for a disk. What a power cut may take of a job's state, its
+  // journal still knows.
+  database->exec("PRAGMA synchronous = NORMAL");
   migrate(*database);
   return database;
 }

@@ -20,7 +20,7 @@ class JobStore {
   JobStore(const JobStore&) = delete;
   JobStore& operator=(const JobStore&) = delete;
 
-  /// Gives the job its id. Durable when it returns.
+  /// Gives the job its id. What is stored survives the daemon's death; a power cut may take the last moments.
   void insert(Job& job);
   void update(const Job& job);
   std::vector<Job> load_all();

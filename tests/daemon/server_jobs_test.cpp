@@ -181,6 +181,9 @@ TEST(ServerJobsTest, AStopWhileTheWayIsPlannedLeavesTheJobResumable) {
   EXPECT_EQ(client.result("job.get", named(id)).at("job").at("state"), "paused");
   world.clear_and_arm(client);
   EXPECT_EQ(client.result("job.resume", named(id)).at("job").at("state"), "painting");
+  while (client.result("job.get", named(id)).at("job").at("stage") != "approach") std::this_thread::yield();
+  EXPECT_EQ(client.result("job.pause", named(id)).at("job").at("state"), "paused");
+  EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "armed");
 }
 
 TEST(ServerJobsTest, NoWayToTheNextDotPausesTheJobWithASentence) {
