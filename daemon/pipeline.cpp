@@ -171,9 +171,15 @@ DotSequence sample_dots(Workpiece& piece, Stages& stages) {
   const auto curve = stages.run(
       "curve", [&](const Progress& progress) { return std::make_unique<SurfaceCurve>(piece.mesh, progress); });
   piece.report.mesh.components = curve->components();
-  return stages.run("dots", [&](const Progress& progress) {
+  auto dots = stages.run("dots", [&](const Progress& progress) {
     return place_dots(*curve, *piece.tone, sample_options(piece.settings), &piece.report.path, progress);
   });
+  if (dots.dots.empty()) {
+    piece.report.mesh.warnings.emplace_back(
+        "there is nothing to paint: the surface is white, blank or transparent everywhere");
+    stages.warn(piece.report.mesh.warnings.back());
+  }
+  return dots;
 }
 
 PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesystem::path& output, Stages& stages) {
@@ -215,8 +221,10 @@ std::vector<Emission> paint_in_simulation(const ExposureProgram& program, CellDe
 
   Journal journal = Journal::in_memory(program.exposures.size());
   ExecutionControl control;
+  std::vector<Joints> approach;  // the program's own way from home
+  for (const Via& via : program.vias_before(0)) approach.push_back(via.joints);
   const auto total = static_cast<double>(std::max<std::size_t>(program.exposures.size(), 1));
-  const ExecutionResult result = execute(program, {}, cell, description, journal, control,
+  const ExecutionResult result = execute(program, approach, cell, description, journal, control,
                                          [&](std::size_t done) { progress(static_cast<double>(done) / total); });
   cell.laser.disable();
   if (result.outcome != ExecutionOutcome::kFinished)

@@ -2,8 +2,8 @@
 #include <sstream>
 #include <string>
 
-/// Broken invariants. CHECK is always on; its handler is called with the message and must not return (the daemon's turns
-/// the beam off first). Anything a file or a person can cause is an InputError instead, see input_error.h.
+/// Broken invariants. CHECK is always on; its handler is called with the message and must not return (the daemon's
+/// turns the beam off first). Anything a file or a person can cause is an InputError instead, see input_error.h.
 namespace hilbrush {
 
 using CheckHandler = void (*)(const std::string& message);
@@ -25,10 +25,11 @@ std::string describe_comparison(const char* expression, const A& a, const B& b) 
 
 #define CHECK(condition) \
   ((condition) ? void() : ::hilbrush::check_failed(__FILE__, __LINE__, "broken invariant: " #condition))
-#define CHECK_OP_(a, b, op)                            \
-  (((a)op(b)) ? void()                                 \
-              : ::hilbrush::check_failed(__FILE__, __LINE__, \
-                                         ::hilbrush::detail::describe_comparison("broken invariant: " #a " " #op " " #b, a, b)))
+#define CHECK_OP_(a, b, op)               \
+  (((a)op(b)) ? void()                    \
+              : ::hilbrush::check_failed( \
+                    __FILE__, __LINE__,   \
+                    ::hilbrush::detail::describe_comparison("broken invariant: " #a " " #op " " #b, a, b)))
 #define CHECK_EQ(a, b) CHECK_OP_(a, b, ==)
 #define CHECK_LE(a, b) CHECK_OP_(a, b, <=)
 #define CHECK_LT(a, b) CHECK_OP_(a, b, <)

@@ -1,7 +1,9 @@
 #include "sampling/model_file.h"
 
+#include <algorithm>
 #include <string_view>
 
+#include "sampling/face_list.h"
 #include "sampling/input_error.h"
 #include "sampling/mesh_file.h"
 #include "sampling/model_folder.h"
@@ -76,6 +78,18 @@ Model load_vrml(std::string text, const std::string& name, ModelFolder& folder, 
   return model;
 }
 
+/// A mesh format that says nothing of colour means no white object but any object: it is painted in the grey that
+/// viewers show it in. (VRML does say: a shape without a material is white.)
+void paint_in_default_grey(Model& model, const std::string& name) {
+  constexpr double kGrey = .8;  // sRGB-encoded, as the default material of VRML has it
+  const auto is_silent = [](const Material& material) { return material.source == ColorSource::kNone; };
+  if (!std::ranges::all_of(model.mesh.materials, is_silent)) return;
+  for (Material& material : model.mesh.materials) material.source = ColorSource::kMaterial;
+  const float luminance = luminance_of_srgb(kGrey, kGrey, kGrey);
+  for (auto& corners : model.mesh.corner_luminance) corners.fill(luminance);
+  model.warnings.push_back(name + ": the file says nothing of colour; the object is painted in a light grey");
+}
+
 }  // namespace
 
 Model load_model(const fs::path& file, const ImageReader& read_image, const ModelLimits& limits) {
@@ -85,7 +99,8 @@ Model load_model(const fs::path& file, const ImageReader& read_image, const Mode
   std::string text = folder.read(inside);
   if (text.empty()) throw InputError(name, "the file is empty");
   Model model;
-  switch (kind_of(text, file, name)) {
+  const Kind kind = kind_of(text, file, name);
+  switch (kind) {
     case Kind::kVrml:
       model = load_vrml(std::move(text), name, folder, read_image, limits);
       break;
@@ -102,6 +117,7 @@ Model load_model(const fs::path& file, const ImageReader& read_image, const Mode
       model = load_stl(std::move(text), name, limits);
       break;
   }
+  if (kind != Kind::kVrml) paint_in_default_grey(model, name);
   model.files = folder.files();
   return model;
 }

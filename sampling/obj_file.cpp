@@ -246,7 +246,10 @@ void read_mtl(std::string_view text, std::map<std::string, MtlMaterial>& materia
       if (is_good) current->diffuse = color;
     } else if (key == "d" || key == "Tr") {
       const auto number = number_in<double>(take_word(rest));
-      if (number && std::isfinite(*number)) current->opacity = std::clamp(key == "d" ? *number : 1 - *number, 0., 1.);
+      // Some exporters write the opacity as Tr. A Tr of 1 would be a surface that nobody can see: it is taken as
+      // opaque.
+      const bool is_meant = number && std::isfinite(*number) && !(key == "Tr" && *number >= 1);
+      if (is_meant) current->opacity = std::clamp(key == "d" ? *number : 1 - *number, 0., 1.);
     } else if (key == "map_Kd") {
       current->texture = texture_name(rest);
     }

@@ -245,8 +245,11 @@ class Placement {
 std::uint64_t count_of(const SampleOptions& options, double mass) {
   if (options.pitch_m.has_value() == options.dot_count.has_value())
     throw InputError("", "give either dpi or the number of dots, not both and not neither");
-  if (!(mass > 0))
-    throw InputError("", "the surface asks for no dots at all: it is blank, white or transparent everywhere");
+  if (!(mass > 0)) {
+    if (options.dot_count)
+      throw InputError("", "the surface asks for no dots at all: it is blank, white or transparent everywhere");
+    return 0;
+  }
   double count = 0;
   if (options.pitch_m) {
     if (!(*options.pitch_m > 0) || !std::isfinite(*options.pitch_m))
@@ -279,6 +282,10 @@ DotSequence place_dots(const SurfaceCurve& curve, const ToneField& tone, const S
   SampleReport figures;
   DotSequence sequence;
   sequence.pitch_m = options.pitch_m.value_or(std::sqrt(mass.total() / static_cast<double>(count)));
+  if (count == 0) {
+    if (report) *report = figures;
+    return sequence;
+  }
   Placement placement(curve.implementation(), tone, options, mass, count);
   sequence.dots = placement.place(figures, progress);
   figures.path_length_m = path_length(sequence.dots);

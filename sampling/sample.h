@@ -51,8 +51,8 @@ class SurfaceCurve {
 
 /// Spreads dots along the curve so that every stretch of equal mass (asked coverage times area) gets one.
 /// Same input and seed: same bytes, whatever the number of threads.
-/// @throws InputError if the surface asks for no dots at all, neither or both of pitch and count are given, or
-/// dot_limit is exceeded.
+/// No dots at all where everything is white, blank or transparent; a count other than 0 is an InputError then.
+/// @throws InputError if neither or both of pitch and count are given, or dot_limit is exceeded.
 DotSequence place_dots(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
                        SampleReport* report = nullptr, const Progress& progress = {});
 

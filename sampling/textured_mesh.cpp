@@ -1,8 +1,7 @@
 #include "sampling/textured_mesh.h"
 
-#include <limits>
-
 #include <Eigen/Geometry>
+#include <limits>
 
 namespace hilbrush {
 

@@ -5,8 +5,8 @@
 /// Options of the tone: what the paint can show and what must be asked of it. Std only, so that config/ can read them.
 namespace hilbrush {
 
-/// Asked coverage for wanted coverage, both 0 = white, 1 = one full dot a pitch squared; undoes dot gain. Piecewise linear.
-/// `asked` may exceed 1: where the paint needs more than one dot's energy a pitch squared to be black.
+/// Asked coverage for wanted coverage, both 0 = white, 1 = one full dot a pitch squared; undoes dot gain. Piecewise
+/// linear. `asked` may exceed 1: where the paint needs more than one dot's energy a pitch squared to be black.
 struct ToneCurve {
   std::vector<double> wanted;  ///< strictly rising from 0 to 1
   std::vector<double> asked;   ///< rising, same length; both empty: identity
