@@ -1,5 +1,7 @@
 #include "sampling/tone_field.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -16,6 +18,9 @@ constexpr double kMostTexels = 1 << 16;
 /// Least height, in texels, that a triangle gets in its texture: one that is collapsed there would have no polygons to
 /// integrate over.
 constexpr double kLeastTexels = 1e-3;
+/// Of all layers together, about; and the finest that a texel is cut, along a side.
+constexpr double kRefinedTexels = 12e6;
+constexpr int kMostRefinement = 15;
 
 double cross(const Vector2d& a, const Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
@@ -72,7 +77,7 @@ ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& ma
     const auto& l = mesh_.corner_luminance[t];
     factor = l[0] == l[1] && l[1] == l[2] ? l[0] : (l[0] + l[1] + l[2]) / 3;
   }
-  const Source source{Source::kTexture, find_layer(material.texture, factor, material.opacity)};
+  const Source source{Source::kTexture, find_layer(material, factor)};
   sources_[t] = source;
   const auto p = texel_corners(t);
   for (int k = 0; k < 3; ++k)
@@ -82,20 +87,42 @@ ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& ma
   return source;
 }
 
-std::uint32_t ToneField::find_layer(int texture_index, float luminance_factor, double opacity) {
+/// The curve bends between texels too: black beside white asks for much less in the middle than the mean of both. So
+/// the curve is applied to texels finer by a whole odd factor, whose centres fall on the texture's own and which repeat
+/// its interpolation exactly; as fine as a fair share of memory allows.
+int ToneField::refinement_of(const Texture& texture) const {
+  if (options_.curve.wanted.empty()) return 1;
+  const double share = kRefinedTexels / static_cast<double>(mesh_.textures.size());
+  const double texels = static_cast<double>(texture.width) * texture.height;
+  int refinement = 1;
+  while (refinement < kMostRefinement && texels * (refinement + 2) * (refinement + 2) <= share) refinement += 2;
+  return refinement;
+}
+
+std::uint32_t ToneField::find_layer(const Material& material, float luminance_factor) {
+  const TexelAddressing addressing{material.repeat_u, material.repeat_v};
   for (std::uint32_t i = 0; i < layers_.size(); ++i)
-    if (layers_[i].texture == texture_index && layers_[i].luminance_factor == luminance_factor &&
-        layers_[i].opacity == opacity)
+    if (layers_[i].texture == material.texture && layers_[i].luminance_factor == luminance_factor &&
+        layers_[i].opacity == material.opacity && layers_[i].addressing == addressing)
       return i;
-  const Texture& texture = mesh_.textures[static_cast<std::size_t>(texture_index)];
-  std::vector<float> tones(texture.luminance.size());
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(material.texture)];
+  const int refinement = refinement_of(texture);
+  const int width = texture.width * refinement, height = texture.height * refinement;
+  std::vector<float> tones(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   const double factor = luminance_factor < 0 ? 1 : luminance_factor;
-  for (std::size_t i = 0; i < tones.size(); ++i) {
-    const double texel_opacity = texture.opacity.empty() ? 1 : texture.opacity[i];
-    tones[i] = static_cast<float>(asked_for(coverage(factor * texture.luminance[i]) * texel_opacity * opacity));
-  }
-  layers_.push_back(
-      {texture_index, luminance_factor, opacity, ToneLayer(texture.width, texture.height, std::move(tones))});
+  const auto wanted_of_texel = [&](std::size_t i) {
+    return coverage(factor * texture.luminance[i]) * (texture.opacity.empty() ? 1 : texture.opacity[i]);
+  };
+  tbb::parallel_for(0, height, [&](int row) {
+    float* out = tones.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
+    for (int column = 0; column < width; ++column) {
+      const Vector2d texel((column + .5) / refinement - .5, (row + .5) / refinement - .5);
+      const double wanted = look_up(texture.width, texture.height, texel, addressing, wanted_of_texel);
+      out[column] = static_cast<float>(asked_for(wanted * material.opacity));
+    }
+  });
+  layers_.push_back({material.texture, luminance_factor, material.opacity, addressing, refinement,
+                     ToneLayer(width, height, std::move(tones))});
   return static_cast<std::uint32_t>(layers_.size() - 1);
 }
 
@@ -168,7 +195,8 @@ double ToneField::asked(const SurfacePoint& point) const {
     case Source::kTexture:
       break;
   }
-  return layers_[source.layer].tones.at(texel_at(point), addressing(point.triangle));
+  const Layer& layer = layers_[source.layer];
+  return layer.tones.at(layer.refined(texel_at(point)), layer.addressing);
 }
 
 ToneIntegral ToneField::integrate(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
@@ -215,7 +243,9 @@ ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const
 }
 
 ToneIntegral ToneField::integrate_texture(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
-  const auto p = texel_corners(triangle);
+  const Layer& layer = layers_[sources_[triangle].layer];
+  auto p = texel_corners(triangle);
+  for (Vector2d& corner : p) corner = layer.refined(corner);
   const Vector2d e1 = p[1] - p[0], e2 = p[2] - p[0];
   std::array<Vector2d, kMostPolygonCorners> texels;
   CHECK_LE(polygon.size(), texels.size());
@@ -228,8 +258,7 @@ ToneIntegral ToneField::integrate_texture(std::uint32_t triangle, std::span<cons
   ToneIntegral result;
   result.area_m2 = .5 * std::abs(twice_area_b) * space;
   if (twice_area_b == 0) return result;
-  const TexelIntegral t =
-      layers_[sources_[triangle].layer].tones.integrate({texels.data(), polygon.size()}, addressing(triangle));
+  const TexelIntegral t = layer.tones.integrate({texels.data(), polygon.size()}, layer.addressing);
   // From texels to space; the sign takes care of clockwise polygons and mirrored textures.
   const double determinant = cross(e1, e2);
   const double scale = (twice_area_b > 0 ? space : -space) / determinant;

@@ -23,8 +23,8 @@ struct ToneIntegral {
 
 class ToneField {
  public:
-  /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over the texels and triangles; four bytes a
-  /// texel.
+  /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over texels and triangles; four to six
+  /// bytes a texel of the textures, refined where they are small (see refinement_of).
   ToneField(const TexturedMesh& mesh, const ToneOptions& options);
 
   double wanted(const SurfacePoint& point) const;  ///< 0..1
@@ -47,7 +47,8 @@ class ToneField {
 
   void choose_sources();
   Source textured_source(std::uint32_t triangle, const Material& material);
-  std::uint32_t find_layer(int texture, float luminance_factor, double opacity);
+  std::uint32_t find_layer(const Material& material, float luminance_factor);
+  int refinement_of(const Texture& texture) const;
   double coverage(double luminance) const;
   double asked_for(double wanted) const { return wanted <= 0 ? 0 : options_.curve(wanted); }
 
@@ -65,7 +66,14 @@ class ToneField {
     int texture = 0;
     float luminance_factor = 1;  ///< below 0: the texture replaces the surface's colour
     double opacity = 1;
+    TexelAddressing addressing;
+    int refinement = 1;  ///< texels of `tones` for one of the texture's, along a side
     ToneLayer tones;
+
+    /// From the texture's texels to those of `tones`.
+    Eigen::Vector2d refined(const Eigen::Vector2d& texel) const {
+      return refinement * (texel + Eigen::Vector2d::Constant(.5)) - Eigen::Vector2d::Constant(.5);
+    }
   };
 
   const TexturedMesh& mesh_;

@@ -10,6 +10,8 @@ namespace hilbrush {
 
 struct TexelAddressing {
   bool repeat_x = true, repeat_y = true;  ///< else the border texels go on for ever
+
+  bool operator==(const TexelAddressing&) const = default;
 };
 
 /// Integrals over a polygon in texel coordinates; signed: negative if the polygon runs clockwise.

@@ -80,7 +80,7 @@ ViewPicture render(const Film& film, const ToneField& tone, std::span<const Eige
   for (std::size_t i = 0; i < smooth.weights.size(); ++i)
     picture.image.channels[kError][i] = smooth.channels[kPainted][i] - smooth.channels[kWanted][i];
   for (const Eigen::Vector3d& p_O : skipped_O)
-    if (const auto pixel = view.pixel_of(p_O, 3 * film.pitch_m())) picture.skipped.push_back(*pixel / oversampling);
+    if (const auto pixel = view.pixel_of(p_O, 2 * pixel_m)) picture.skipped.push_back(*pixel / oversampling);
   return picture;
 }
 
