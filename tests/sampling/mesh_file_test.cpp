@@ -77,6 +77,29 @@ TEST(ObjFile, ReportsWhatIsWrongWithItsLine) {
   EXPECT_EQ(disk.load("m.obj", points + "v nan 0 0\nf 1 2 3\nf 1 2 4\n").mesh.triangle_count(), 1u);
 }
 
+TEST(ObjFile, WithoutAWordOfColorIsPaintedGrey) {
+  const ModelOnDisk disk;
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const Model model = disk.load("m.obj", triangle);
+  EXPECT_TRUE(warns(model, "says nothing of colour"));
+  EXPECT_NEAR(model.mesh.corner_luminance[0][0], .604, 1e-3);  // sRGB .8 in linear light
+  disk.write("m.mtl", "newmtl a\nKd 1 1 1\n");
+  EXPECT_EQ(disk.load("m.obj", "mtllib m.mtl\nusemtl a\n" + triangle).mesh.corner_luminance[0][0], 1)
+      << "white is a word";
+}
+
+TEST(ObjFile, TransparencyOfOneIsTakenAsOpacity) {
+  const ModelOnDisk disk;
+  const auto opacity = [&](const std::string& line) {
+    disk.write("m.mtl", "newmtl a\nKd 0 0 0\n" + line + "\n");
+    return disk.load("m.obj", "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh.materials[0].opacity;
+  };
+  EXPECT_EQ(opacity("Tr 1"), 1);
+  EXPECT_EQ(opacity("Tr 0.25"), .75);
+  EXPECT_EQ(opacity("d 0.25"), .25);
+  EXPECT_EQ(opacity("d 0"), 0);
+}
+
 TEST(ObjFile, ReadsNothingOutsideItsFolder) {
   const ModelOnDisk disk;
   std::ofstream(disk.outer() / "secret.mtl") << "newmtl a\nKd 0 0 0\n";
@@ -85,7 +108,8 @@ TEST(ObjFile, ReadsNothingOutsideItsFolder) {
   const Model model =
       disk.load("m.obj", "mtllib ../secret.mtl\nmtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_TRUE(warns(model, "outside the model's folder"));
-  EXPECT_EQ(model.mesh.materials[0].source, ColorSource::kNone);
+  EXPECT_GT(model.mesh.corner_luminance[0][0], .5) << "the default grey, not the black of the library outside";
+  EXPECT_TRUE(model.mesh.textures.empty());
   EXPECT_EQ(model.files.size(), 2u);
 }
 
@@ -172,9 +196,8 @@ TEST(OffFile, ReadsCommentsCountsOnTheFirstLineAndColors) {
   EXPECT_EQ(model.mesh.corner_luminance[1][0], 0);
   model = disk.load("m.off", "COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 255\n3 0 1 2\n");
   EXPECT_NEAR(model.mesh.corner_luminance[0][1], .7152, 1e-3);
-  EXPECT_EQ(disk.load("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").mesh.materials[0].source,
-            ColorSource::kNone)
-      << "nothing is left of the file before";
+  model = disk.load("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  EXPECT_EQ(model.mesh.materials[0].source, ColorSource::kMaterial) << "nothing is left of the file before";
   EXPECT_EQ(disk.refusal("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n"),
             "m.off:4: expected vertex 3 of 3, found the end of the file");
   EXPECT_NE(disk.refusal("m.off", "OFF BINARY\n").find("binary OFF is not read"), std::string::npos);

@@ -234,6 +234,9 @@ TEST(Sample, RefusesWhatItCannotDo) {
   TexturedMesh blank = white;
   for (auto& corners : blank.corner_luminance) corners.fill(1);
   EXPECT_THROW(sample(blank, options_for(100)), InputError);
+  SampleOptions by_pitch;
+  by_pitch.pitch_m = .001;
+  EXPECT_TRUE(sample(blank, by_pitch).dots.empty()) << "white is what the paint is already";
   EXPECT_THROW(sample(white, SampleOptions{}), InputError);
   SampleOptions both = options_for(100);
   both.pitch_m = .001;

@@ -116,6 +116,21 @@ TEST(ToneField, MurrayDaviesAndTheToneCurve) {
   EXPECT_NEAR(tone.asked(at(0, {.2, .3})), bent_curve()(wanted), 1e-7);
 }
 
+TEST(ToneField, TheCurveBendsBetweenTexelsToo) {
+  // Black beside white: halfway the curve asks for much less than the mean of what it asks for black and white.
+  const TexturedMesh mesh = test::with_texture(
+      test::rectangle(.01, .01, 1, 1), 4, 4, [](int i, int) { return i % 2; }, false, false);
+  ToneOptions options;
+  options.curve = {{0, .5, 1}, {0, .35, 2}};
+  const ToneField tone(mesh, options);
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> uniform(0, .5);
+  for (int k = 0; k < 1000; ++k) {
+    const SurfacePoint point = at(static_cast<std::uint32_t>(k % 2), {uniform(random), uniform(random)});
+    EXPECT_NEAR(tone.asked(point), options.curve(tone.wanted(point)), .06) << "seed " << kSeed;
+  }
+}
+
 TEST(ToneField, OneChannelMultipliesThreeReplace) {
   for (const int channels : {1, 2, 3, 4}) {
     TexturedMesh mesh = test::with_texture(test::rectangle(.01, .01, 1, 1), 4, 4, [](int, int) { return .5; });

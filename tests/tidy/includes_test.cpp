@@ -26,7 +26,8 @@ constexpr const char* kPosix =
     "(unistd|fcntl|poll|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)/[a-z_]+\\.h";
 
 const LibraryRule kRules[]{
-    {"sampling_images", "sampling/images/.*", "sampling/[^/]+\\.h|sampling/images/.*", "OpenImageIO/.*|Eigen/.*"},
+    {"sampling_images", "sampling/images/.*", "sampling/[^/]+\\.h|sampling/images/.*",
+     "OpenImageIO/.*|Eigen/.*|zlib\\.h"},
     {"sampling", "sampling/.*", "sampling/[^/]+\\.h|sampling/(vrml|quality)/.*",
      "Eigen/.*|OpenMesh/.*|tbb/.*|oneapi/.*|zlib\\.h|boost/polygon/.*|metis\\.h"},
     {"cell_model", "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.(h|cpp)",
