@@ -19,14 +19,14 @@ struct HilbertQuad {
   HilbertQuad child(unsigned i) const { return {kPermutations[permutation][i]}; }
 
  private:
-  static constexpr std::uint8_t A = 0, B = 1, C = 2, D = 3;
+  enum Permutation : std::uint8_t { kA, kB, kC, kD };
   static constexpr std::array<std::array<std::uint8_t, 4>, 4> kPermutations{
-      {{B, A, A, D}, {A, B, B, C}, {D, C, C, B}, {C, D, D, A}}};
+      {{kB, kA, kA, kD}, {kA, kB, kB, kC}, {kD, kC, kC, kB}, {kC, kD, kD, kA}}};
   static constexpr std::array<std::array<std::uint8_t, 4>, 4> kPlaces{
       {{0, 2, 3, 1}, {0, 1, 3, 2}, {3, 1, 0, 2}, {3, 2, 0, 1}}};
 
  public:
-  constexpr HilbertQuad(std::uint8_t p = A) : permutation(p) {}
+  constexpr HilbertQuad(std::uint8_t p = kA) : permutation(p) {}
 };
 
 /// In space: Gray code with entry corner and direction, after Hamilton, "Compact Hilbert Indices", 2006.

@@ -256,7 +256,7 @@ std::size_t turn_closed_parts_outwards(const TexturedMesh& mesh, Orientation& or
     std::vector<std::uint32_t> part{seed};
     bool is_closed = true;
     double volume = 0;
-    const Eigen::Vector3d origin = mesh.corner(seed, 0);
+    const Eigen::Vector3d& origin = mesh.corner(seed, 0);
     for (std::size_t i = 0; i < part.size(); ++i) {
       volume += mesh.area_vector(part[i]).dot(mesh.corner(part[i], 0) - origin);
       for (const TriangleSide other : orientation.partners()[part[i]]) {

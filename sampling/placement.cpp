@@ -8,7 +8,7 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kLargestSide_m = 2;
+constexpr double kLargestSideM = 2;
 
 std::string millimetres(double length_m) {
   char text[40];
@@ -52,9 +52,9 @@ TexturedMesh place_on_table(const Model& model, const PlacementOptions& options)
   if (!std::isfinite(longest_side) || longest_side <= 0) throw InputError("", "the model has no extent");
   const double scale = scale_of(model, options, longest_side);
   const double size_m = scale * longest_side;
-  if (!std::isfinite(size_m) || size_m > kLargestSide_m)
+  if (!std::isfinite(size_m) || size_m > kLargestSideM)
     throw InputError("", "the object would be " + millimetres(size_m) + " long, more than " +
-                             millimetres(kLargestSide_m) +
+                             millimetres(kLargestSideM) +
                              "; give --size-mm (its longest side) or --units-mm (one unit of the file)");
   if (size_m < 1e-6) throw InputError("", "the object would be only " + millimetres(size_m) + " long");
   const Eigen::Vector3d foot((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, low.z());

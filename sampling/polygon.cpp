@@ -28,7 +28,7 @@ bool is_inside(const Vector2d& p, const Vector2d& a, const Vector2d& b, const Ve
 void PolygonCutter::project(const std::vector<Vector3d>& corners) {
   // Relative to the first corner, so that a polygon far from the origin keeps its digits.
   Vector3d normal = Vector3d::Zero();
-  const Vector3d origin = corners[0];
+  const Vector3d& origin = corners[0];
   for (std::size_t i = 0; i < corners.size(); ++i)
     normal += (corners[i] - origin).cross(corners[(i + 1) % corners.size()] - origin);
   int axis = 0;

@@ -88,8 +88,28 @@ SurfacePoint centre_on_surface(const SurfaceCurve::Implementation& curve, const 
   return asked > 0 && asked >= kBlankShare * tone.asked(heaviest->centre) ? nearest.point : heaviest->centre;
 }
 
-Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& point,
+namespace {
+
+/// A hair inside its triangle: a beam that is aimed at the very edge of an open surface may pass it by.
+SurfacePoint inset(const TexturedMesh& mesh, const SurfacePoint& point) {
+  constexpr double kInsetM = 2e-6, kMostShare = .1;
+  const double twice_area = 2 * mesh.area_vector(point.triangle).norm();
+  SurfacePoint inside = point;
+  for (int c = 0; c < 3; ++c) {
+    const double opposite =
+        (mesh.corner(point.triangle, (c + 1) % 3) - mesh.corner(point.triangle, (c + 2) % 3)).norm();
+    const double least = std::min(kMostShare, kInsetM * opposite / twice_area);
+    inside.barycentric[c] = std::max(inside.barycentric[c], least);
+  }
+  inside.barycentric /= inside.barycentric.sum();
+  return inside;
+}
+
+}  // namespace
+
+Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& place,
              std::uint32_t component) {
+  const SurfacePoint point = inset(curve.mesh, place);
   Dot dot;
   dot.position_O = position(curve.mesh, point);
   dot.normal_O = face_normal(curve.mesh, point).cast<float>();

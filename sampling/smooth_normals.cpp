@@ -7,7 +7,7 @@ namespace hilbrush {
 namespace {
 
 /// Edges that turn by more are edges of the object, not of its triangulation.
-constexpr double kSharpEdge_rad = 40 * std::numbers::pi / 180;
+constexpr double kSharpEdge = 40 * std::numbers::pi / 180;
 
 class CornerNormals {
  public:
@@ -27,7 +27,7 @@ class CornerNormals {
   TriangleSide smooth_step(TriangleSide across, std::uint32_t from) const {
     if (across == kNoSide) return kNoSide;
     const double cosine = face_normals_[from].dot(face_normals_[across.triangle]);
-    return cosine < std::cos(kSharpEdge_rad) ? kNoSide : across;
+    return cosine < std::cos(kSharpEdge) ? kNoSide : across;
   }
   TriangleSide clockwise(TriangleSide corner) const {
     TriangleSide across = smooth_step(neighbours_[corner.triangle][corner.side], corner.triangle);

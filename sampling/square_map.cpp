@@ -29,7 +29,7 @@ constexpr double kLeastWeight = 1e-2, kMostWeight = 1e3;
 /// Below this METIS has nothing to gain.
 constexpr Eigen::Index kSmallSystem = 2000;
 /// A boundary vertex that turns by more is a corner of the shape itself.
-constexpr double kShapeCornerTurn_rad = std::numbers::pi / 4;
+constexpr double kShapeCornerTurn = std::numbers::pi / 4;
 constexpr double kLeastSideShare = .005;
 /// Strips are mapped onto at most so many squares in a row.
 constexpr int kMostSquares = 64;
@@ -88,7 +88,7 @@ std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<do
   const auto turn_at = [&](std::size_t i) { return turn[cut.disk.from(cut.outer[i])]; };
   std::vector<std::size_t> sharp;
   for (std::size_t i = 0; i < cut.outer.size(); ++i)
-    if (turn_at(i) >= kShapeCornerTurn_rad) sharp.push_back(i);
+    if (turn_at(i) >= kShapeCornerTurn) sharp.push_back(i);
   if (sharp.empty()) return std::nullopt;
   std::stable_sort(sharp.begin(), sharp.end(),
                    [&](std::size_t a, std::size_t b) { return turn_at(a) > turn_at(b) + 1e-9; });

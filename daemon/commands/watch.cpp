@@ -62,7 +62,8 @@ int watch_job(CommandContext& context, const std::string& id, const std::string&
       job = member(update, "job");
       const std::string state = text_field(job, "state");
       if (context.is_json) context.terminal.out << update.dump() << std::endl;
-      const std::string phase = state == "planning" ? state + ", " + text_field(job, "stage", "waiting") : state;
+      std::string phase = state;
+      if (state == "planning") phase.append(", ").append(text_field(job, "stage", "waiting"));
       // In a pipe a stage's line is printed when it begins: its share done would say nothing.
       const bool is_begin = state == "planning" && !context.terminal.out_is_terminal;
       display.show(phase, number_field(job, "progress"), is_begin ? "job " + id + ": " + phase : format_job_line(job),

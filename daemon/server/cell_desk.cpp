@@ -77,7 +77,7 @@ void CellDesk::note_executor_at_rest() {
 void CellDesk::begin_clear(Reply reply) {
   thread_.release_stop();
   state_ = State::kClearing;
-  thread_.clear([this, reply = std::move(reply), stops = stops_](std::optional<CellFault> fault) {
+  thread_.clear([this, reply = std::move(reply), stops = stops_](const std::optional<CellFault>& fault) {
     if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped again while it was cleared", ""});
     finish_act(reply, State::kIdle, fault);
   });
@@ -87,7 +87,7 @@ void CellDesk::arm(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
   if (state_ != State::kIdle) refuse("it can be armed only when idle");
   state_ = State::kArming;
-  thread_.arm([this, reply = std::move(reply), stops = stops_](std::optional<CellFault> fault) {
+  thread_.arm([this, reply = std::move(reply), stops = stops_](const std::optional<CellFault>& fault) {
     if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped while it was armed", ""});
     finish_act(reply, State::kArmed, fault);
   });
@@ -97,7 +97,7 @@ void CellDesk::home(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
   if (state_ != State::kIdle && state_ != State::kArmed) refuse("it can be homed only when idle or armed");
   const State before = std::exchange(state_, State::kHoming);
-  thread_.home([this, reply = std::move(reply), before, stops = stops_](std::optional<CellFault> fault) {
+  thread_.home([this, reply = std::move(reply), before, stops = stops_](const std::optional<CellFault>& fault) {
     if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped on its way home", ""});
     finish_act(reply, before, fault);
   });

@@ -82,7 +82,9 @@ std::optional<RpcFault> check_object(const Json& value, const Json& schema, cons
   const Json properties = schema.value("properties", Json::object());
   for (const auto& [name, member] : value.items()) {
     if (properties.contains(name)) {
-      if (auto fault = check_schema(member, properties[name], at + "." + name)) return fault;
+      std::string place = at;
+      place.append(".").append(name);
+      if (auto fault = check_schema(member, properties[name], place)) return fault;
     } else if (schema.value("additionalProperties", true) == false) {
       return RpcFault{kRpcBadParams, "is not known here", at + "." + name.substr(0, 100)};
     }

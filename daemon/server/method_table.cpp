@@ -1,6 +1,7 @@
 #include "daemon/server/method_table.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "sampling/input_error.h"
 
@@ -228,12 +229,11 @@ void MethodTable::dispatch(const RpcRequest& request, const Caller& caller, Repl
   if (method->is_act) {
     const auto record = [this, peer = caller.peer, name = method->name, params = request.params](
                             const std::string& result) { audit_.record(peer, name, params, result); };
-    Reply inner = std::move(reply);
-    reply.result = [record, answer = inner.result](Json result) {
+    reply.result = [record, answer = std::exchange(reply.result, {})](Json result) {
       record("ok");
       answer(std::move(result));
     };
-    reply.fault = [record, answer = inner.fault](RpcFault fault) {
+    reply.fault = [record, answer = std::exchange(reply.fault, {})](RpcFault fault) {
       record(fault.message);
       answer(std::move(fault));
     };

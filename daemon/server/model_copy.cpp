@@ -81,7 +81,7 @@ void write_all(int fd, const char* bytes, std::size_t count, const fs::path& fil
 
 /// Relative to `base`, by name only: links were already followed or not when the list was made.
 fs::path place_below(const fs::path& file, const fs::path& base) {
-  const fs::path relative = fs::absolute(file).lexically_normal().lexically_relative(base);
+  fs::path relative = fs::absolute(file).lexically_normal().lexically_relative(base);
   if (relative.empty() || *relative.begin() == "..")
     throw InputError(file.string(), "lies outside the model's folder; a job takes only what is below it");
   return relative;

@@ -15,8 +15,10 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "sampling/check.h"
 
@@ -83,6 +85,10 @@ struct Launch {
 }
 
 std::uint64_t resident_bytes(pid_t pid) {
+  // Between fork and exec the child is a copy of the daemon, whose size says nothing of the pipeline's.
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/" + std::to_string(pid) + "/exe", error);
+  if (error || program == std::filesystem::read_symlink("/proc/self/exe", error)) return 0;
   std::ifstream in("/proc/" + std::to_string(pid) + "/statm");
   std::uint64_t total = 0, resident = 0;
   in >> total >> resident;

@@ -116,7 +116,7 @@ Vector3d on_section(const Vector2d& p, const std::vector<double>& scale, const s
     const std::size_t k = std::min(i, scale.size() / 2 - 1);
     s = {scale[2 * k], scale[2 * k + 1]};
   }
-  const Vector3d scaled(p.x() * s.x(), 0, p.y() * s.y());
+  Vector3d scaled(p.x() * s.x(), 0, p.y() * s.y());
   if (orientation.size() < 4) return scaled;
   const std::size_t k = std::min(i, orientation.size() / 4 - 1);
   return rotation_matrix({orientation[4 * k], orientation[4 * k + 1], orientation[4 * k + 2], orientation[4 * k + 3]}) *

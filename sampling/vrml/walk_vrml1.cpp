@@ -42,7 +42,8 @@ Eigen::Affine3d matrix_of(const Reference& node) {
   if (m.size() < 16) return X;
   // Written row by row, for row vectors.
   for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) X(row, column) = m[static_cast<std::size_t>(4 * column + row)];
+    for (int column = 0; column < 4; ++column)
+      X(row, column) = m[std::size_t{4} * static_cast<std::size_t>(column) + static_cast<std::size_t>(row)];
   return X;
 }
 

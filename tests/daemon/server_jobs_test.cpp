@@ -139,13 +139,16 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
   world.options.time_scale = 0.02;
   world.begin();
   LineClient client(world.options.socket);
-  const auto id = world.submit(client, world.model("long.wrl", 500), "ready");
+  const auto id = world.submit(client, world.model("long.wrl", 2000), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(id));
   Json job;
-  // Until a stop happens to cut a pulse.
-  for (int round = 0; round < 200; ++round) {
-    std::this_thread::sleep_for(std::chrono::microseconds(1000 + 137 * round));
+  const auto now = [&] { return client.result("job.get", named(id)).at("job"); };
+  // Until a stop happens to cut a pulse, in which the cell spends most of its time; each after some dots more.
+  for (int round = 0; round < 100; ++round) {
+    const Json before = now();
+    for (job = before; job.at("state") == "painting" && job.at("dots") == before.at("dots");) job = now();
+    ASSERT_NE(job.at("state"), "done") << "no stop has cut a pulse";
     client.result("cell.stop");
     job = world.wait_for(client, id, "paused");
     if (job.at("dots").at("in_doubt").get<int>() > 0) break;
@@ -158,7 +161,7 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
   EXPECT_EQ(client.error_code("job.resume", {{"id", id}, {"in_doubt", "perhaps"}}), kRpcBadParams);
   client.result("job.resume", {{"id", id}, {"in_doubt", "expose"}});
   job = world.wait_for(client, id, "done");
-  EXPECT_EQ(job.at("dots").at("exposed"), 500);
+  EXPECT_EQ(job.at("dots").at("exposed"), 2000);
   EXPECT_EQ(job.at("dots").at("in_doubt"), 0);
   const auto counts = emission_counts(world.job_folder(id));
   for (std::size_t i = 0; i < counts.size(); ++i) {
