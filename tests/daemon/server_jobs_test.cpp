@@ -221,7 +221,7 @@ TEST(ServerJobsTest, AProgramForAnotherModelOrBeyondTheLimitsIsNeverPainted) {
 TEST(ServerJobsTest, PipelinesInTroubleFailTheirJobsWithASentenceAndDisturbNoPainting) {
   DaemonWorld world;
   world.options.time_scale = 0.02;
-  world.options.pipeline_silence_s = 1.5;
+  world.options.pipeline_silence_s = 5;
   world.options.pipeline_memory_mb = 100;
   world.begin();
   LineClient client(world.options.socket);
