@@ -149,6 +149,7 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
     const Json before = now();
     for (job = before; job.at("state") == "painting" && job.at("dots") == before.at("dots");) job = now();
     ASSERT_NE(job.at("state"), "done") << "no stop has cut a pulse";
+    std::this_thread::sleep_for(std::chrono::microseconds(137 * round % 2000));  // another phase of the dot each time
     client.result("cell.stop");
     job = world.wait_for(client, id, "paused");
     if (job.at("dots").at("in_doubt").get<int>() > 0) break;
