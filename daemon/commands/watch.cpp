@@ -66,8 +66,9 @@ int watch_job(CommandContext& context, const std::string& id, const std::string&
       if (state == "planning") phase.append(", ").append(text_field(job, "stage", "waiting"));
       // In a pipe a stage's line is printed when it begins: its share done would say nothing.
       const bool is_begin = state == "planning" && !context.terminal.out_is_terminal;
-      display.show(phase, number_field(job, "progress"), is_begin ? "job " + id + ": " + phase : format_job_line(job),
-                   state == "painting");
+      std::string line = "job ";
+      line.append(id).append(": ").append(phase);
+      display.show(phase, number_field(job, "progress"), is_begin ? line : format_job_line(job), state == "painting");
       if (is_reached(state, until)) break;
     }
     update = next_update(client, interrupts);

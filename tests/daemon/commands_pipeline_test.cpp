@@ -231,12 +231,16 @@ TEST_F(PipelineCommands, InterruptEndsTheChildAndAllItStarted) {
   EXPECT_EQ(run.exit_code, kExitInterrupted);
   EXPECT_TRUE(run.err.starts_with("hilbrush: interrupted: hilbrush-pipeline was ended")) << run.err;
   EXPECT_NE(kill(std::stoi(read("pid")), 0), 0);  // gone, and buried
-  // Orphans are buried by init in its own time: gone, or a zombie.
-  std::ifstream status("/proc/" + std::to_string(std::stoi(read("grandchild"))) + "/stat");
-  std::string pid, name, state;
-  if (status >> pid >> name >> state) {
-    EXPECT_EQ(state, "Z");
-  }
+  // Orphans die and are buried by init in their own time: gone, or a zombie.
+  const std::string orphan = "/proc/" + std::to_string(std::stoi(read("grandchild"))) + "/stat";
+  const auto is_alive = [&] {
+    std::ifstream status(orphan);
+    std::string pid, name, state;
+    return (status >> pid >> name >> state) && state != "Z";
+  };
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (is_alive() && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+  EXPECT_FALSE(is_alive());
 }
 
 }  // namespace
