@@ -16,7 +16,8 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kDotsMax = 50'000'000;
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
 
-const std::vector<std::string> kSamplerNames{"centroid", "jittered", "even", "random"};
+const std::vector<std::string> kSamplerNames{"centroid",   "jittered", "even",         "random", "halton",
+                                             "hammersley", "sobol",    "niederreiter", "blue",   "fine"};
 const std::vector<std::string> kUntexturedNames{"auto", "blank", "material"};
 const std::vector<std::string> kCurveNames{"hilbert"};
 const std::vector<std::string> kUpNames{"y", "z"};

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "sampling/edges.h"
+#include "sampling/disk/edges.h"
 #include "sampling/input_error.h"
 
 namespace hilbrush {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <string_view>
 
-#include "sampling/face_list.h"
+#include "sampling/files/face_list.h"
+#include "sampling/files/mesh_file.h"
 #include "sampling/input_error.h"
-#include "sampling/mesh_file.h"
 #include "sampling/model_folder.h"
 #include "sampling/vrml/reading.h"
 

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "sampling/check.h"
+#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/sequence.h"
 #include "sampling/input_error.h"
-#include "sampling/put_on_surface.h"
-#include "sampling/sequence.h"
 
 namespace hilbrush {
 namespace {

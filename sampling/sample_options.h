@@ -10,7 +10,27 @@ enum class Sampler {
   kCentroid,  ///< at the stratum's centre of mass, put back on the surface (default)
   kJittered,  ///< at a random place along the stratum (the thesis, section 4.4)
   kEven,      ///< in the middle of the stratum along the curve
-  kRandom     ///< anywhere along the whole curve, sorted: the control
+  kRandom,    ///< anywhere along the whole curve, sorted: the control
+  kHalton,    ///< low-discrepancy sequences in one dimension, along the whole curve, sorted (section 4.4)
+  kHammersley,
+  kSobol,
+  kNiederreiter,
+  kBlue,  ///< in the stratum where neighbours push least: an isotropic blue-noise spectrum
+  kFine   ///< centroid, then moved for the picture that the paint will show (refine_dots)
+};
+
+/// In which order the surface is walked.
+enum class CurveKind {
+  kHilbert,  ///< table 4.1 of the thesis (default)
+  kPeano2,   ///< table 4.2: nine children
+  kLaminar   ///< plane slices from the table upwards: what the curves replace, as a baseline
+};
+
+/// What decides how many dots a piece of surface asks for.
+enum class DensitySource {
+  kTexture,           ///< the wanted tone (default)
+  kMeanCurvature,     ///< section 6.1.3
+  kGaussianCurvature  ///< section 6.1.3
 };
 
 struct SampleOptions {

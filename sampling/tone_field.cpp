@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "sampling/check.h"
-#include "sampling/tone_polygon.h"
+#include "sampling/tone/tone_polygon.h"
 
 namespace hilbrush {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "sampling/textured_mesh.h"
 #include "sampling/tone.h"
-#include "sampling/tone_layer.h"
+#include "sampling/tone/tone_layer.h"
 
 /// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is
 /// measured against) and as asked (after it: the density of dots). Bilinear between texels, linear between vertex

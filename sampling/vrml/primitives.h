@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "sampling/face_list.h"
+#include "sampling/files/face_list.h"
 
 /// VRML's solids as polygons with their texture mapping (VRML97, 6.6, 6.11, 6.14, 6.42). Round ones have `kSegments`
 /// sides: within .1 % of the radius of the true surface.

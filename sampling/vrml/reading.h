@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling/face_list.h"
+#include "sampling/files/face_list.h"
 #include "sampling/model_file.h"
 #include "sampling/model_folder.h"
 #include "sampling/vrml/binding.h"

@@ -1,5 +1,5 @@
 #pragma once
-#include "sampling/face_list.h"
+#include "sampling/files/face_list.h"
 #include "sampling/model_file.h"
 #include "sampling/vrml/binding.h"
 

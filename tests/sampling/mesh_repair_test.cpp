@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "sampling/components.h"
+#include "sampling/disk/components.h"
 #include "sampling/input_error.h"
 #include "tests/support/meshes.h"
 

@@ -3,11 +3,11 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "sampling/curve/patch_walk.h"
+#include "sampling/curve/surface_curve.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"
-#include "sampling/patch_walk.h"
 #include "sampling/placement.h"
-#include "sampling/surface_curve.h"
 
 namespace hilbrush {
 namespace {

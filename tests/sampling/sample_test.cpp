@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "sampling/curve/patch_walk.h"
+#include "sampling/curve/surface_curve.h"
 #include "sampling/input_error.h"
 #include "sampling/mesh_repair.h"
-#include "sampling/patch_walk.h"
-#include "sampling/surface_curve.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -1,0 +1,27 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "sampling/curve/sheet.h"
+#include "sampling/disk/edges.h"
+#include "sampling/sample.h"
+
+/// What SurfaceCurve keeps of a mesh: sheets with their base trees, and what a dot needs to know of its surroundings.
+namespace hilbrush {
+
+struct SurfaceCurve::Implementation {
+  explicit Implementation(const TexturedMesh& m) : mesh(m) {}
+
+  const TexturedMesh& mesh;
+  Neighbours neighbours;
+  std::vector<ComponentReport> components;
+  std::vector<Sheet> sheets;  ///< in the order in which they are walked
+  std::vector<std::array<Eigen::Vector3f, 3>> corner_normals;
+};
+
+/// Unit normals per corner: the mean, weighted by angle, over the triangles around the vertex up to the next sharp
+/// edge.
+std::vector<std::array<Eigen::Vector3f, 3>> smooth_corner_normals(const TexturedMesh& mesh,
+                                                                  const Neighbours& neighbours);
+
+}  // namespace hilbrush

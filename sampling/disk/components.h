@@ -1,0 +1,35 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "sampling/disk/edges.h"
+#include "sampling/textured_mesh.h"
+
+/// The connected parts of a mesh, and their shape.
+namespace hilbrush {
+
+/// A boundary loop as the triangle sides along it, each beginning where the one before ends.
+using BoundaryLoop = std::vector<TriangleSide>;
+
+struct Component {
+  std::vector<std::uint32_t> triangles;  ///< rising
+  int genus = -1;                        ///< -1: not a manifold
+  int boundary_loops = 0;
+  double area_m2 = 0;
+};
+
+/// Triangles hang together over shared edges; the components are in order of their first triangles. Cost O(n).
+std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbours& neighbours);
+
+/// All loops of sides without a neighbour, in order of their first sides.
+std::vector<BoundaryLoop> boundary_loops(const Neighbours& neighbours);
+
+/// Numbers the fans of a mesh: all corners that hang together around a vertex get the same number, in order of their
+/// first corners. Returns the numbers by triangle and how many there are.
+struct Fans {
+  std::vector<Triangle> of_corners;
+  std::uint32_t count = 0;
+};
+Fans find_fans(const Neighbours& neighbours);
+
+}  // namespace hilbrush

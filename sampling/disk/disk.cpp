@@ -1,0 +1,94 @@
+#include "sampling/disk/disk.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hilbrush {
+
+Disk::Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<std::uint32_t>& triangles) {
+  const auto face_of = [&](std::uint32_t t) {
+    return static_cast<std::uint32_t>(std::lower_bound(triangles.begin(), triangles.end(), t) - triangles.begin());
+  };
+  for (const auto t : triangles) {
+    faces_.push_back(mesh.triangles[t]);
+    sources_.push_back({t, {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}});
+    neighbours_.push_back(neighbours[t]);
+    for (TriangleSide& other : neighbours_.back())
+      if (other != kNoSide) other.triangle = face_of(other.triangle);
+  }
+  const Fans fans = find_fans(neighbours_);
+  positions_.resize(fans.count);
+  for (std::size_t f = 0; f < faces_.size(); ++f)
+    for (std::size_t c = 0; c < 3; ++c) positions_[fans.of_corners[f][c]] = mesh.vertices[faces_[f][c]];
+  faces_ = fans.of_corners;
+}
+
+std::uint32_t Disk::split_edge(TriangleSide s) {
+  const auto middle = static_cast<std::uint32_t>(positions_.size());
+  positions_.push_back(.5 * (positions_[from(s)] + positions_[to(s)]));
+  const TriangleSide across = neighbours_[s.triangle][s.side];
+  // Cuts one face from the middle of a side to its apex: it keeps the first half, a new face takes the second.
+  const auto halve = [&](TriangleSide side) {
+    const auto [f, i] = side;
+    const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    const auto added = static_cast<std::uint32_t>(faces_.size());
+    FaceSource second = sources_[f];
+    const Eigen::Vector2d middle_b = .5 * (second.corners[i] + second.corners[j]);
+    second.corners = {middle_b, sources_[f].corners[j], sources_[f].corners[k]};
+    sources_[f].corners[j] = middle_b;
+    faces_.push_back({middle, faces_[f][j], faces_[f][k]});
+    faces_[f][j] = middle;
+    sources_.push_back(second);
+    const TriangleSide beyond = neighbours_[f][j];
+    neighbours_.push_back({kNoSide, beyond, {f, static_cast<std::uint8_t>(j)}});
+    if (beyond != kNoSide) neighbours_[beyond.triangle][beyond.side] = {added, 1};
+    neighbours_[f][j] = {added, 2};
+    return added;
+  };
+  const std::uint32_t second = halve(s);
+  if (across == kNoSide) return middle;
+  const std::uint32_t second_across = halve(across);
+  neighbours_[s.triangle][s.side] = {second_across, 0};
+  neighbours_[second_across][0] = s;
+  neighbours_[second][0] = across;
+  neighbours_[across.triangle][across.side] = {second, 0};
+  return middle;
+}
+
+void Disk::cut_edge(TriangleSide s) {
+  const TriangleSide across = std::exchange(neighbours_[s.triangle][s.side], kNoSide);
+  if (across != kNoSide) neighbours_[across.triangle][across.side] = kNoSide;
+}
+
+void Disk::finish_cuts() {
+  Fans fans = find_fans(neighbours_);
+  std::vector<Eigen::Vector3d> positions(fans.count);
+  for (std::size_t f = 0; f < faces_.size(); ++f)
+    for (std::size_t c = 0; c < 3; ++c) positions[fans.of_corners[f][c]] = positions_[faces_[f][c]];
+  positions_ = std::move(positions);
+  faces_ = std::move(fans.of_corners);
+}
+
+void Disk::fill(const BoundaryLoop& loop) {
+  if (loop.size() == 2) {
+    // A slit: its sides go together again.
+    neighbours_[loop[0].triangle][loop[0].side] = loop[1];
+    neighbours_[loop[1].triangle][loop[1].side] = loop[0];
+    return;
+  }
+  const auto centre = static_cast<std::uint32_t>(positions_.size());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const TriangleSide s : loop) sum += positions_[from(s)];
+  positions_.push_back(sum / static_cast<double>(loop.size()));
+  const auto first = static_cast<std::uint32_t>(faces_.size());
+  const auto n = static_cast<std::uint32_t>(loop.size());
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const TriangleSide s = loop[i];
+    faces_.push_back({to(s), from(s), centre});
+    sources_.push_back({});
+    neighbours_.push_back({s, {first + (i + n - 1) % n, 2}, {first + (i + 1) % n, 1}});
+    neighbours_[s.triangle][s.side] = {first + i, 0};
+  }
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,50 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "sampling/disk/components.h"
+#include "sampling/disk/edges.h"
+#include "sampling/textured_mesh.h"
+
+/// A component on its way to the square: its triangles as faces that may be split, cut apart and filled up. Every face
+/// knows which part of which mesh triangle it is.
+namespace hilbrush {
+
+/// The part of a mesh triangle that a face covers; faces that only fill a hole have kNoTriangle.
+struct FaceSource {
+  std::uint32_t triangle = kNoTriangle;
+  std::array<Eigen::Vector2d, 3> corners;  ///< second and third barycentric coordinate
+};
+
+class Disk {
+ public:
+  /// `triangles` rising, as in Component.
+  Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<std::uint32_t>& triangles);
+
+  const std::vector<Triangle>& faces() const { return faces_; }
+  const std::vector<FaceSource>& sources() const { return sources_; }
+  const Neighbours& neighbours() const { return neighbours_; }
+  const std::vector<Eigen::Vector3d>& positions() const { return positions_; }  ///< per vertex, metres
+
+  std::uint32_t from(TriangleSide s) const { return faces_[s.triangle][s.side]; }
+  std::uint32_t to(TriangleSide s) const { return faces_[s.triangle][(s.side + 1) % 3]; }
+  double length(TriangleSide s) const { return (positions_[to(s)] - positions_[from(s)]).norm(); }
+
+  /// Puts a vertex in the middle of an edge; side `s` then ends there. Returns the new vertex.
+  std::uint32_t split_edge(TriangleSide s);
+  /// Takes the given edges apart (call finish_cuts() after the last).
+  void cut_edge(TriangleSide s);
+  /// Gives each fan that the cuts have made a vertex of its own.
+  void finish_cuts();
+  /// Closes a boundary loop by a fan of faces without mass; one of two sides is closed by itself.
+  void fill(const BoundaryLoop& loop);
+
+ private:
+  std::vector<Triangle> faces_;
+  std::vector<FaceSource> sources_;
+  Neighbours neighbours_;
+  std::vector<Eigen::Vector3d> positions_;
+};
+
+}  // namespace hilbrush
