@@ -11,12 +11,16 @@ namespace hilbrush {
 /// In the plane: the permutation table of the thesis (table 4.1, figure 4.3). The curve starts at the lower left corner
 /// of the square and ends at the lower right one.
 struct HilbertQuad {
-  static constexpr unsigned kChildCount = 4;
+  static constexpr unsigned kSide = 2;        ///< children along a side
+  static constexpr unsigned kChildCount = 4;  ///< kSide^2
+  static constexpr unsigned kPermutationCount = 4;
   std::uint8_t permutation = 0;  ///< A, B, C or D
 
-  /// Place of the i-th child along the curve.
+  /// Place of the i-th child along the curve: column + kSide * row.
   unsigned place(unsigned i) const { return kPlaces[permutation][i]; }
   HilbertQuad child(unsigned i) const { return {kPermutations[permutation][i]}; }
+  /// How the curve runs in the square to the right of this one, if both are walked one after the other.
+  HilbertQuad next_square() const { return {kA}; }
 
  private:
   enum Permutation : std::uint8_t { kA, kB, kC, kD };
@@ -31,6 +35,7 @@ struct HilbertQuad {
 
 /// In space: Gray code with entry corner and direction, after Hamilton, "Compact Hilbert Indices", 2006.
 struct HilbertCube {
+  static constexpr unsigned kSide = 2;
   static constexpr unsigned kChildCount = 8;
   std::uint8_t entry = 0;      ///< the corner where the curve comes in
   std::uint8_t direction = 0;  ///< the axis along which it leaves, counted down by one
