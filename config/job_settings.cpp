@@ -13,13 +13,15 @@ namespace {
 constexpr double kDefaultDpi = 100;
 constexpr double kMetresPerInch = 0.0254;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr std::uint64_t kDotsMax = 50'000'000;
+constexpr std::uint64_t kDotsMax = 1'000'000'000;  // what memory allows is found by the pipeline
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
 
 const std::vector<std::string> kSamplerNames{"centroid",   "jittered", "even",         "random", "halton",
                                              "hammersley", "sobol",    "niederreiter", "blue",   "fine"};
 const std::vector<std::string> kUntexturedNames{"auto", "blank", "material"};
-const std::vector<std::string> kCurveNames{"hilbert"};
+const std::vector<std::string> kCurveNames{"hilbert", "peano2", "laminar"};
+const std::vector<std::string> kDensityNames{"texture", "mean_curvature", "gaussian_curvature"};
+const std::vector<std::string> kToneMappingNames{"calibrated", "linear"};
 const std::vector<std::string> kUpNames{"y", "z"};
 
 /// How many dots and how large: of each pair at most one.
@@ -43,16 +45,37 @@ void read_incidence(JsonObject& json, JobSettings& settings) {
       preferred.value_or(std::min(settings.preferred_incidence_deg, settings.max_incidence_deg));
 }
 
+/// How dots are placed, and what improves them afterwards.
+void read_sampling(JsonObject& json, JobSettings& settings) {
+  if (const auto choice = json.optional_choice("sampler", kSamplerNames))
+    settings.sampler = static_cast<Sampler>(*choice);
+  if (const auto choice = json.optional_choice("curve", kCurveNames)) settings.curve = static_cast<CurveKind>(*choice);
+  if (const auto choice = json.optional_choice("density", kDensityNames))
+    settings.density = static_cast<DensitySource>(*choice);
+  settings.seed = json.optional_integer("seed", 0, UINT64_MAX).value_or(settings.seed);
+  const auto small = [&json](const char* key, std::uint64_t min, std::uint64_t max, int otherwise) {
+    const auto number = json.optional_integer(key, min, max);
+    return number ? static_cast<int>(*number) : otherwise;
+  };
+  settings.levels = small("levels", 1, kMostLevels, settings.levels);
+  settings.predictive_rounds = small("predictive_rounds", 0, 4, settings.predictive_rounds);
+  settings.largest_gap_pitches = json.optional_number("largest_gap_pitches", {1, 100});
+  settings.fine_passes = small("fine_passes", 1, 1000, settings.fine_passes);
+  if (const auto choice = json.optional_choice("tone_curve", kToneMappingNames))
+    settings.tone_curve = static_cast<ToneMapping>(*choice);
+  if (settings.curve != CurveKind::kLaminar) return;
+  if (settings.sampler != Sampler::kCentroid)
+    json.refuse("sampler", "laminar slices place their dots in one way only: leave sampler out");
+  if (settings.largest_gap_pitches) json.refuse("largest_gap_pitches", "laminar slices have no strata to fill");
+}
+
 JobSettings read_settings(JsonObject& json) {
   JobSettings settings;
   read_amounts(json, settings);
   if (const auto up = json.optional_choice("up", kUpNames)) settings.up = kUpNames[*up];
   if (const auto choice = json.optional_choice("untextured", kUntexturedNames))
     settings.untextured = static_cast<Untextured>(*choice);
-  if (const auto choice = json.optional_choice("sampler", kSamplerNames))
-    settings.sampler = static_cast<Sampler>(*choice);
-  if (const auto choice = json.optional_choice("curve", kCurveNames)) settings.curve = kCurveNames[*choice];
-  settings.seed = json.optional_integer("seed", 0, UINT64_MAX).value_or(settings.seed);
+  read_sampling(json, settings);
   read_incidence(json, settings);
   settings.cell = json.optional_text("cell", 4096).value_or(settings.cell);
   settings.dry_run = json.optional_boolean("dry_run").value_or(settings.dry_run);
@@ -83,8 +106,14 @@ std::string job_settings_to_json(const JobSettings& settings) {
                                     {"up", or_null(settings.up)},
                                     {"untextured", untextured_name(settings.untextured)},
                                     {"sampler", sampler_name(settings.sampler)},
-                                    {"curve", settings.curve},
+                                    {"curve", curve_name(settings.curve)},
+                                    {"density", density_name(settings.density)},
                                     {"seed", settings.seed},
+                                    {"levels", settings.levels},
+                                    {"predictive_rounds", settings.predictive_rounds},
+                                    {"largest_gap_pitches", or_null(settings.largest_gap_pitches)},
+                                    {"fine_passes", settings.fine_passes},
+                                    {"tone_curve", tone_mapping_name(settings.tone_curve)},
                                     {"max_incidence_deg", settings.max_incidence_deg},
                                     {"preferred_incidence_deg", settings.preferred_incidence_deg},
                                     {"cell", settings.cell},
@@ -94,6 +123,18 @@ std::string job_settings_to_json(const JobSettings& settings) {
 
 const char* sampler_name(Sampler sampler) {
   return kSamplerNames[static_cast<std::size_t>(sampler)].c_str();
+}
+
+const char* curve_name(CurveKind curve) {
+  return kCurveNames[static_cast<std::size_t>(curve)].c_str();
+}
+
+const char* density_name(DensitySource density) {
+  return kDensityNames[static_cast<std::size_t>(density)].c_str();
+}
+
+const char* tone_mapping_name(ToneMapping mapping) {
+  return kToneMappingNames[static_cast<std::size_t>(mapping)].c_str();
 }
 
 const char* untextured_name(Untextured untextured) {

@@ -11,6 +11,12 @@
 /// command (size_mm: --size-mm).
 namespace hilbrush {
 
+/// From wanted tone to asked coverage.
+enum class ToneMapping {
+  kCalibrated,  ///< by the cell's tone curve
+  kLinear       ///< asked = wanted times the cell's asked_max: for a wedge that a curve is to be made from
+};
+
 struct JobSettings {
   std::optional<double> dpi;          ///< dots per 25.4 mm of full tone; or
   std::optional<std::uint64_t> dots;  ///< exactly so many
@@ -19,8 +25,14 @@ struct JobSettings {
   std::optional<std::string> up;      ///< "y" or "z"
   Untextured untextured = Untextured::kAuto;
   Sampler sampler = Sampler::kCentroid;
-  std::string curve = "hilbert";
+  CurveKind curve = CurveKind::kHilbert;
+  DensitySource density = DensitySource::kTexture;
   std::uint64_t seed = 1;
+  int levels = 1;             ///< energies that a dot may have, 1 to 4
+  int predictive_rounds = 0;  ///< of the loop that predicts the picture and asks again, 0 to 4
+  std::optional<double> largest_gap_pitches;  ///< holes wider than this are filled with dots
+  int fine_passes = 24;                       ///< over all dots, of the sampler "fine"
+  ToneMapping tone_curve = ToneMapping::kCalibrated;
   double max_incidence_deg = 45;
   double preferred_incidence_deg = 20;
   std::string cell = "default";  ///< name of a shipped cell, or a file
@@ -34,8 +46,12 @@ JobSettings job_settings_from_json(const std::string& text, const std::string& o
 /// Canonical: all keys in a fixed order (null where nothing is set), so that its hash identifies the settings.
 std::string job_settings_to_json(const JobSettings& settings);
 
-const char* sampler_name(Sampler sampler);           ///< "centroid", "jittered", "even", "random"
+/// The names of the choices in files, messages and reports.
+const char* sampler_name(Sampler sampler);           ///< "centroid", "jittered", ...
+const char* curve_name(CurveKind curve);             ///< "hilbert", "peano2", "laminar"
+const char* density_name(DensitySource density);     ///< "texture", "mean_curvature", "gaussian_curvature"
 const char* untextured_name(Untextured untextured);  ///< "auto", "blank", "material"
+const char* tone_mapping_name(ToneMapping mapping);  ///< "calibrated", "linear"
 
 SampleOptions sample_options(const JobSettings& settings);
 PlanOptions plan_options(const JobSettings& settings);

@@ -50,7 +50,20 @@ void SettingsFlags::add_to(CLI::App& command) {
   command.add_option("--up", up, "the model's upward axis, y or z (default: the format's habit)")->group(group);
   command.add_option("--untextured", untextured, "parts without texture or colours: auto, blank or material")
       ->group(group);
-  command.add_option("--curve", curve, "hilbert")->group(group);
+  command.add_option("--density", density, "what asks for dots: texture, mean_curvature or gaussian_curvature")
+      ->group(group);
+  command
+      .add_option("--predictive-rounds", predictive_rounds,
+                  "predict the picture and place the dots again, 0 to 4 times (default 0; 2 is plenty)")
+      ->group(group);
+  command
+      .add_option("--largest-gap-pitches", largest_gap_pitches,
+                  "fill holes between dots that are wider than this many pitches, 1 to 100 (default: none)")
+      ->group(group);
+  command
+      .add_option("--tone-curve", tone_curve,
+                  "calibrated (default), or linear: asked = wanted times asked_max, to paint a wedge")
+      ->group(group);
   command.add_option("--max-incidence-deg", max_incidence_deg, "never more oblique than this, 1 to 45 (default 45)")
       ->group(group);
   command
@@ -61,7 +74,14 @@ void SettingsFlags::add_to(CLI::App& command) {
 
 void SettingsFlags::add_paint_flags_to(CLI::App& command) {
   const std::string group = "Settings of the job";
-  command.add_option("--sampler", sampler, "centroid, jittered, even or random (default centroid)")->group(group);
+  command
+      .add_option("--sampler", sampler,
+                  "centroid (default), jittered, even, random, halton, hammersley, sobol, niederreiter, blue or fine")
+      ->group(group);
+  command.add_option("--curve", curve, "hilbert (default), peano2 or laminar")->group(group);
+  command.add_option("--levels", levels, "energies that a dot may have, 1 to 4 (default 1)")->group(group);
+  command.add_option("--fine-passes", fine_passes, "over all dots, of the sampler fine, 1 to 1000 (default 24)")
+      ->group(group);
   command.add_option("--seed", seed, "of what is random (default 1)")->group(group);
   command.add_option("--cell", cell, "name of a cell, or its file (default: default)")->group(group);
   command.add_option("--settings", file, "JSON file with any of these settings; flags override it")->group(group);
@@ -71,7 +91,8 @@ void SettingsFlags::add_paint_flags_to(CLI::App& command) {
 
 bool SettingsFlags::any() const {
   return !file.empty() || dpi || size_mm || units_mm || max_incidence_deg || preferred_incidence_deg || dots || seed ||
-         up || untextured || sampler || curve || cell;
+         up || untextured || sampler || curve || density || levels || predictive_rounds || largest_gap_pitches ||
+         fine_passes || tone_curve || cell;
 }
 
 std::string SettingsFlags::to_json(const std::string& base, const std::string& base_origin) const {
@@ -89,6 +110,12 @@ std::string SettingsFlags::to_json(const std::string& base, const std::string& b
   put(json, "untextured", untextured);
   put(json, "sampler", sampler);
   put(json, "curve", curve);
+  put(json, "density", density);
+  put(json, "levels", levels);
+  put(json, "predictive_rounds", predictive_rounds);
+  put(json, "largest_gap_pitches", largest_gap_pitches);
+  put(json, "fine_passes", fine_passes);
+  put(json, "tone_curve", tone_curve);
   put(json, "seed", seed);
   put(json, "max_incidence_deg", max_incidence_deg);
   put(json, "preferred_incidence_deg", preferred_incidence_deg);

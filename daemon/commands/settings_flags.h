@@ -14,9 +14,9 @@ namespace hilbrush {
 
 struct SettingsFlags {
   std::string file;  ///< JSON; empty: none
-  std::optional<double> dpi, size_mm, units_mm, max_incidence_deg, preferred_incidence_deg;
-  std::optional<std::uint64_t> dots, seed;
-  std::optional<std::string> up, untextured, sampler, curve, cell;
+  std::optional<double> dpi, size_mm, units_mm, max_incidence_deg, preferred_incidence_deg, largest_gap_pitches;
+  std::optional<std::uint64_t> dots, seed, levels, predictive_rounds, fine_passes;
+  std::optional<std::string> up, untextured, sampler, curve, density, tone_curve, cell;
 
   /// Declares all flags on `command`; this object must outlive its parsing.
   void add_to(CLI::App& command);
