@@ -14,6 +14,7 @@ constexpr double kDefaultDpi = 100;
 constexpr double kMetresPerInch = 0.0254;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kDotsMax = 1'000'000'000;  // what memory allows is found by the pipeline
+constexpr std::uint64_t kLevelsMax = 4;
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
 
 const std::vector<std::string> kSamplerNames{"centroid",   "jittered", "even",         "random", "halton",
@@ -57,7 +58,7 @@ void read_sampling(JsonObject& json, JobSettings& settings) {
     const auto number = json.optional_integer(key, min, max);
     return number ? static_cast<int>(*number) : otherwise;
   };
-  settings.levels = small("levels", 1, kMostLevels, settings.levels);
+  settings.levels = small("levels", 1, kLevelsMax, settings.levels);
   settings.predictive_rounds = small("predictive_rounds", 0, 4, settings.predictive_rounds);
   settings.largest_gap_pitches = json.optional_number("largest_gap_pitches", {1, 100});
   settings.fine_passes = small("fine_passes", 1, 1000, settings.fine_passes);

@@ -68,6 +68,8 @@ struct SurfacePoint {
 
 /// Position of `point` in the mesh's frame.
 Eigen::Vector3d position(const TexturedMesh& mesh, const SurfacePoint& point);
+/// The point of `triangle` at the foot of the perpendicular from `p_O`.
+SurfacePoint surface_point(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O);
 /// Unit normal of the point's triangle.
 Eigen::Vector3d face_normal(const TexturedMesh& mesh, const SurfacePoint& point);
 /// Axis-aligned bounds of the vertices that triangles use: {minimum, maximum}.

@@ -57,6 +57,11 @@ ToneField::ToneField(const TexturedMesh& mesh, const ToneOptions& options) : mes
   choose_sources();
 }
 
+ToneField::ToneField(const ToneField& base, AskedAtlas atlas)
+    : mesh_(base.mesh_), options_(base.options_), atlas_(std::move(atlas)), sources_(base.sources_) {
+  CHECK(&atlas_->layout.mesh() == &mesh_);
+}
+
 void ToneField::choose_sources() {
   bool any_colored = false;
   for (const auto m : mesh_.material_index)
@@ -183,32 +188,30 @@ double ToneField::wanted(const SurfacePoint& point) const {
   return wanted_of_texture(point);
 }
 
+ToneField::AskedTexels ToneField::asked_texels(std::uint32_t triangle) const {
+  if (atlas_) return {atlas_->tones, {false, false}, atlas_->layout.texel_corners(triangle)};
+  const Layer& layer = layers_[sources_[triangle].layer];
+  auto corners = texel_corners(triangle);
+  for (Vector2d& corner : corners) corner = layer.refined(corner);
+  return {layer.tones, layer.addressing, corners};
+}
+
 double ToneField::asked(const SurfacePoint& point) const {
   const Source source = sources_[point.triangle];
-  switch (source.kind) {
-    case Source::kBlank:
-      return 0;
-    case Source::kColors:
-      return asked_for(wanted(point));
-    case Source::kMean:
-      return layers_[source.layer].tones.mean();
-    case Source::kTexture:
-      break;
-  }
-  const Layer& layer = layers_[source.layer];
-  return layer.tones.at(layer.refined(texel_at(point)), layer.addressing);
+  if (source.kind == Source::kBlank) return 0;
+  if (!atlas_ && source.kind == Source::kColors) return asked_for(wanted(point));
+  if (!atlas_ && source.kind == Source::kMean) return layers_[source.layer].tones.mean();
+  const AskedTexels texels = asked_texels(point.triangle);
+  const auto& p = texels.corners;
+  return texels.tones.at(point.barycentric[0] * p[0] + point.barycentric[1] * p[1] + point.barycentric[2] * p[2],
+                         texels.addressing);
 }
 
 ToneIntegral ToneField::integrate(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
   const Source source = sources_[triangle];
-  switch (source.kind) {
-    case Source::kColors:
-      return integrate_colors(triangle, polygon);
-    case Source::kTexture:
-      return integrate_texture(triangle, polygon);
-    case Source::kBlank:
-    case Source::kMean:
-      break;
+  if (source.kind != Source::kBlank) {
+    if (atlas_ || source.kind == Source::kTexture) return integrate_texture(triangle, polygon);
+    if (source.kind == Source::kColors) return integrate_colors(triangle, polygon);
   }
   const double tone = source.kind == Source::kMean ? layers_[source.layer].tones.mean() : 0;
   return integrate_linear(
@@ -243,9 +246,8 @@ ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const
 }
 
 ToneIntegral ToneField::integrate_texture(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
-  const Layer& layer = layers_[sources_[triangle].layer];
-  auto p = texel_corners(triangle);
-  for (Vector2d& corner : p) corner = layer.refined(corner);
+  const AskedTexels asked = asked_texels(triangle);
+  const auto& p = asked.corners;
   const Vector2d e1 = p[1] - p[0], e2 = p[2] - p[0];
   std::array<Vector2d, kMostPolygonCorners> texels;
   CHECK_LE(polygon.size(), texels.size());
@@ -258,7 +260,7 @@ ToneIntegral ToneField::integrate_texture(std::uint32_t triangle, std::span<cons
   ToneIntegral result;
   result.area_m2 = .5 * std::abs(twice_area_b) * space;
   if (twice_area_b == 0) return result;
-  const TexelIntegral t = layer.tones.integrate({texels.data(), polygon.size()}, layer.addressing);
+  const TexelIntegral t = asked.tones.integrate({texels.data(), polygon.size()}, asked.addressing);
   // From texels to space; the sign takes care of clockwise polygons and mirrored textures.
   const double determinant = cross(e1, e2);
   const double scale = (twice_area_b > 0 ? space : -space) / determinant;

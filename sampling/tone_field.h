@@ -1,11 +1,13 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "sampling/textured_mesh.h"
 #include "sampling/tone.h"
+#include "sampling/tone/asked_atlas.h"
 #include "sampling/tone/tone_layer.h"
 
 /// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is
@@ -26,6 +28,9 @@ class ToneField {
   /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over texels and triangles; four to six
   /// bytes a texel of the textures, refined where they are small (see refinement_of).
   ToneField(const TexturedMesh& mesh, const ToneOptions& options);
+
+  /// The same picture, asked for otherwise: wanted and blank as `base`, asked by the atlas (0 where base is blank).
+  ToneField(const ToneField& base, AskedAtlas atlas);
 
   double wanted(const SurfacePoint& point) const;  ///< 0..1
   double asked(const SurfacePoint& point) const;   ///< 0..the curve's largest value
@@ -76,8 +81,17 @@ class ToneField {
     }
   };
 
+  /// Where a triangle's asked tones are, with its corners in their texels.
+  struct AskedTexels {
+    const ToneLayer& tones;
+    TexelAddressing addressing;
+    std::array<Eigen::Vector2d, 3> corners;
+  };
+  AskedTexels asked_texels(std::uint32_t triangle) const;
+
   const TexturedMesh& mesh_;
   ToneOptions options_;
+  std::optional<AskedAtlas> atlas_;
   std::vector<Source> sources_;  ///< per triangle
   std::vector<Layer> layers_;
 };

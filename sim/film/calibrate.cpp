@@ -7,6 +7,7 @@
 #include "sampling/sample.h"
 #include "sampling/tone_field.h"
 #include "sim/film/film.h"
+#include "sim/film/picture_means.h"
 
 namespace hilbrush {
 
@@ -28,16 +29,6 @@ TexturedMesh black_field(double width_m, double height_m) {
   field.material_index = {0, 0};
   field.materials = {{.name = "black", .source = ColorSource::kColors}};
   return field;
-}
-
-SurfacePoint surface_point(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O) {
-  const Eigen::Vector3d area = mesh.area_vector(triangle);
-  const auto share = [&](int c) {
-    const Eigen::Vector3d& from = mesh.corner(triangle, (c + 1) % 3);
-    return .5 * (mesh.corner(triangle, (c + 2) % 3) - from).cross(p_O - from).dot(area) / area.squaredNorm();
-  };
-  const double u = share(0), v = share(1);
-  return {triangle, {u, v, 1 - u - v}};
 }
 
 /// Mean coverage of the field but for its border, by an even lattice of places a third of a pitch apart.
@@ -63,14 +54,8 @@ double paint_step(const CellDescription& cell, double pitch_m, SampleOptions opt
   options.pitch_m = pitch_m;
   options.dot_count.reset();
   const DotSequence dots = place_dots(curve, tone, options);
-  std::vector<SurfacePoint> points;
-  std::vector<float> levels;
-  for (const Dot& dot : dots.dots) {
-    points.push_back(surface_point(field, dot.triangle, dot.position_O));
-    levels.push_back(dot.level);
-  }
   Film film(field, cell, pitch_m);
-  film.expose_at(points, levels);
+  expose_dots(film, dots);
   return read_field(film, kFieldWidth * pitch_m, kFieldHeight * pitch_m);
 }
 

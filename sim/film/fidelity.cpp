@@ -11,19 +11,21 @@
 
 #include "sim/film/masked_image.h"
 #include "sim/film/orthographic_view.h"
+#include "sim/film/picture_means.h"
 
 namespace hilbrush {
 
 namespace {
 
 constexpr std::size_t kSampleCount = 20'000;
-constexpr double kIdenticalDb = 99;  ///< stands for "no difference at all"
+constexpr std::array<double, 2> kSigmas{1, 2};  ///< of F1 and F2, in pitches
+constexpr double kIdenticalDb = 99;             ///< stands for "no difference at all"
 
 /// A surface point of the measurement, and what the film shows around it.
 struct Reading {
   SurfacePoint point;
   bool is_reachable = false;
-  std::array<double, 2> wanted{}, painted{};  ///< Gaussian means of sigma 1 and 2 pitches
+  std::array<PictureMeans, 2> means;  ///< of sigma 1 and 2 pitches
 };
 
 /// SplitMix64 (Steele et al. 2014) as a hash: independent numbers for each (seed, index), whatever thread asks.
@@ -50,31 +52,6 @@ std::vector<Reading> stratified_points(const TexturedMesh& mesh, std::uint64_t s
   return readings;
 }
 
-/// Area-weighted Gaussian means of wanted and painted coverage around the reading's point.
-void read_film(const Film& film, const ToneField& tone, Reading& reading, std::vector<FilmPoint>& points) {
-  const Eigen::Vector3d center_O = position(film.mesh(), reading.point),
-                        normal_O = face_normal(film.mesh(), reading.point);
-  film.points_near(reading.point, 6 * film.pitch_m(), points);
-  std::array<double, 2> weight{};
-  for (const FilmPoint& point : points) {
-    const Eigen::Vector3d offset = (point.position_O - center_O) / film.pitch_m();
-    const double depth = offset.dot(normal_O), r2 = offset.squaredNorm() - depth * depth;
-    const double wanted = tone.wanted(point.point), painted = film.painted(point.dose_j_m2);
-    for (int k = 0; k < 2; ++k) {
-      const double sigma = k + 1;
-      if (r2 > 9 * sigma * sigma || std::abs(depth) > 3 * sigma) continue;
-      const double w = point.area_m2 * std::exp(-r2 / (2 * sigma * sigma));
-      weight[k] += w, reading.wanted[k] += w * wanted, reading.painted[k] += w * painted;
-    }
-  }
-  for (int k = 0; k < 2; ++k) {
-    // A piece of surface too small to own a node within reach: the point itself.
-    if (!(weight[k] > 0))
-      reading.wanted[k] = tone.wanted(reading.point), reading.painted[k] = film.painted(reading.point), weight[k] = 1;
-    reading.wanted[k] /= weight[k], reading.painted[k] /= weight[k];
-  }
-}
-
 double decibels(double mean_square) {
   return mean_square > 0 ? std::min(kIdenticalDb, -10 * std::log10(mean_square)) : kIdenticalDb;
 }
@@ -87,10 +64,10 @@ FidelityFigures surface_figures(const std::vector<Reading>& readings, Counts cou
   std::vector<double> errors;
   for (const Reading& reading : readings) {
     if (!counts(reading)) continue;
-    for (int k = 0; k < 2; ++k) square[k] += std::pow(reading.painted[k] - reading.wanted[k], 2);
-    const double error = reading.painted[1] - reading.wanted[1];
+    for (int k = 0; k < 2; ++k) square[k] += std::pow(reading.means[k].painted - reading.means[k].wanted, 2);
+    const double error = reading.means[1].painted - reading.means[1].wanted;
     errors.push_back(std::abs(error));
-    const int tenth = std::clamp(static_cast<int>(reading.wanted[1] * 10), 0, 9);
+    const int tenth = std::clamp(static_cast<int>(reading.means[1].wanted * 10), 0, 9);
     tenth_error[tenth] += error, tenth_count[tenth] += 1;
   }
   FidelityFigures figures;
@@ -258,7 +235,7 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
                       [&](const tbb::blocked_range<std::size_t>& range) {
                         std::vector<FilmPoint> points;
                         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                          read_film(film, tone, readings[i], points);
+                          read_means(film, tone, readings[i].point, kSigmas, readings[i].means, points);
                           readings[i].is_reachable = !is_reachable || is_reachable(readings[i].point);
                         }
                       });

@@ -1,0 +1,96 @@
+#include "sampling/levels.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "sampling/check.h"
+#include "sampling/tone/triangle_frame.h"
+
+namespace hilbrush {
+namespace {
+
+/// Width, in wanted tone, of the ramp by which the density falls from 1 where the next level takes over: a curve has no
+/// jumps.
+constexpr double kRamp = 1e-5;
+
+/// What must be wanted for `curve` to ask for this much, on its rising part.
+double wanted_for(const ToneCurve& curve, double asked) {
+  const auto above = std::lower_bound(curve.asked.begin(), curve.asked.end(), asked);
+  if (above == curve.asked.begin()) return curve.wanted.front();
+  if (above == curve.asked.end()) return curve.wanted.back();
+  const auto k = static_cast<std::size_t>(above - curve.asked.begin());
+  const double share = (asked - curve.asked[k - 1]) / (curve.asked[k] - curve.asked[k - 1]);
+  return curve.wanted[k - 1] + share * (curve.wanted[k] - curve.wanted[k - 1]);
+}
+
+/// Energy a dot here stands for: coverage asked over dots placed, within half a pitch and the dot's triangle.
+double local_energy(const Dot& dot, double pitch_m, const ToneField& asked, const ToneField& density) {
+  const TriangleFrame frame(asked.mesh(), dot.triangle);
+  const Eigen::Vector2d center = frame.place(surface_point(asked.mesh(), dot.triangle, dot.position_O).barycentric),
+                        half = Eigen::Vector2d::Constant(pitch_m / 2);
+  const BoxedPolygon around = frame.clip_box(center - half, center + half);
+  const double dots = density.integrate(dot.triangle, around.corners()).mass;
+  return dots > 0 ? asked.integrate(dot.triangle, around.corners()).mass / dots : 0;
+}
+
+}  // namespace
+
+std::vector<double> energy_levels(int count, double asked_max) {
+  CHECK_LE(1, count);
+  CHECK_LE(count, kMostLevels);
+  if (count == 1) return {1};
+  std::vector<double> levels;
+  for (int k = 1; k <= count; ++k) levels.push_back(asked_max * k / count);
+  return levels;
+}
+
+double dots_for(std::span<const double> levels, double asked) {
+  const auto enough = std::lower_bound(levels.begin(), levels.end(), asked);
+  return asked / (enough == levels.end() ? levels.back() : *enough);
+}
+
+ToneCurve density_curve(const ToneCurve& curve, std::span<const double> levels) {
+  if (levels.size() < 2) return curve;
+  const ToneCurve asked = curve.wanted.empty() ? ToneCurve{{0, 1}, {0, 1}} : curve;
+  // Knots: the curve's own, and two at each place where a level is used up.
+  ToneCurve density;
+  const auto add = [&](double wanted, double dots) {
+    if (!density.wanted.empty() && wanted <= density.wanted.back()) return;
+    density.wanted.push_back(wanted), density.asked.push_back(dots);
+  };
+  std::size_t level = 0;
+  for (std::size_t k = 0; k < asked.wanted.size(); ++k) {
+    while (level + 1 < levels.size() && asked.asked[k] > levels[level]) {
+      const double taken_over = wanted_for(asked, levels[level]);
+      add(taken_over, 1);
+      const double next = std::min(taken_over + kRamp, asked.wanted[k]);
+      add(next, asked(next) / levels[level + 1]);
+      ++level;
+    }
+    add(asked.wanted[k], asked.asked[k] / levels[level]);
+  }
+  return density;
+}
+
+void assign_levels(DotSequence& dots, const ToneField& asked, const ToneField& density,
+                   std::span<const double> levels) {
+  CHECK(&asked.mesh() == &density.mesh());
+  if (levels.size() < 2) return;
+  tbb::parallel_for(std::size_t{0}, dots.dots.size(), [&](std::size_t i) {
+    dots.dots[i].level = static_cast<float>(local_energy(dots.dots[i], dots.pitch_m, asked, density));
+  });
+  double carried = 0;
+  for (Dot& dot : dots.dots) {
+    const double wanted = dot.level + carried;
+    const auto above = std::lower_bound(levels.begin(), levels.end(), wanted);
+    double level = above == levels.end() ? levels.back() : *above;
+    if (above != levels.begin() && above != levels.end() && wanted - *(above - 1) < *above - wanted)
+      level = *(above - 1);
+    carried = wanted - level;
+    dot.level = static_cast<float>(level);
+  }
+}
+
+}  // namespace hilbrush
