@@ -29,7 +29,7 @@ const LibraryRule kRules[]{
     {"sampling_images", "sampling/images/.*", "sampling/[^/]+\\.h|sampling/images/.*",
      "OpenImageIO/.*|Eigen/.*|zlib\\.h"},
     {"sampling", "sampling/.*", "sampling/([^/]+|(files|vrml|tone|disk|curve|parametric|quality)/.*)\\.h",
-     "Eigen/.*|OpenMesh/.*|tbb/.*|oneapi/.*|zlib\\.h|boost/polygon/.*|metis\\.h"},
+     "(unsupported/)?Eigen/.*|OpenMesh/.*|tbb/.*|oneapi/.*|zlib\\.h|boost/polygon/.*|metis\\.h"},
     {"cell_model", "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.(h|cpp)",
      "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.h", "Eigen/.*"},
     {"planner", "planner/.*", "planner/.*|sampling/[^/]+\\.h", "Eigen/.*|embree3/.*|tbb/.*|oneapi/.*"},

@@ -1,0 +1,86 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sampling/textured_mesh.h"
+
+/// A mesh's triangles in a balanced tree of boxes: what of the surface lies in a ball, and which point of it is
+/// nearest.
+namespace hilbrush {
+
+class TriangleTree {
+ public:
+  /// Keeps a reference to `mesh`. `masses` has one value a triangle, see mass_within. Cost O(n log n).
+  TriangleTree(const TexturedMesh& mesh, std::span<const double> masses);
+
+  /// Sum of the masses of the triangles that lie wholly within the ball; the others that it touches are handed to
+  /// `partly(triangle)`, whose results are added.
+  template <class Partly>
+  double mass_within(const Eigen::Vector3d& centre, double radius, const Partly& partly) const {
+    return mass_below({centre, radius}, partly, 0, 0, order_.size());
+  }
+
+  /// Calls visit(triangle) for all triangles whose boxes the ball touches.
+  template <class Visit>
+  void visit_near(const Eigen::Vector3d& centre, double radius, const Visit& visit) const {
+    mass_within(centre, radius, [&](std::uint32_t triangle) {
+      visit(triangle);
+      return 0.;
+    });
+  }
+
+  SurfacePoint nearest(const Eigen::Vector3d& place) const;
+
+ private:
+  struct Node {
+    Eigen::AlignedBox3d box;
+    double mass = 0;
+  };
+  struct Sphere {
+    Eigen::Vector3d centre;
+    double radius;
+  };
+  struct Candidate {
+    SurfacePoint point;
+    double distance2;
+  };
+  static constexpr std::size_t kLeafSize = 4;
+
+  bool is_leaf(std::size_t node) const { return 2 * node + 1 >= nodes_.size(); }
+  void build(std::span<const double> masses, std::size_t node, std::size_t begin, std::size_t end);
+  void search(const Eigen::Vector3d& place, std::size_t node, std::size_t begin, std::size_t end,
+              Candidate& best) const;
+
+  static double farthest2(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from) {
+    return (from - box.min()).cwiseMax(box.max() - from).squaredNorm();
+  }
+
+  template <class Partly>
+  double mass_below(const Sphere& sphere, const Partly& partly, std::size_t node, std::size_t begin,
+                    std::size_t end) const {
+    const double radius2 = sphere.radius * sphere.radius;
+    if (begin == end || nodes_[node].box.squaredExteriorDistance(sphere.centre) >= radius2) return 0;
+    if (farthest2(nodes_[node].box, sphere.centre) <= radius2) return nodes_[node].mass;
+    if (is_leaf(node)) {
+      double sum = 0;
+      for (std::size_t i = begin; i < end; ++i) sum += partly(order_[i]);
+      return sum;
+    }
+    const std::size_t middle = begin + (end - begin) / 2;
+    return mass_below(sphere, partly, 2 * node + 1, begin, middle) +
+           mass_below(sphere, partly, 2 * node + 2, middle, end);
+  }
+
+  const TexturedMesh& mesh_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;  ///< a heap: the children of node n are 2n + 1 and 2n + 2
+};
+
+/// The point of a triangle that is nearest to `place`, in barycentric coordinates. After Ericson, "Real-Time Collision
+/// Detection", section 5.1.5.
+Eigen::Vector3d nearest_in_triangle(const Eigen::Vector3d& place, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                    const Eigen::Vector3d& c);
+
+}  // namespace hilbrush
