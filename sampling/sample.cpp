@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "sampling/blue.h"
 #include "sampling/check.h"
 #include "sampling/curve/put_on_surface.h"
 #include "sampling/curve/sequence.h"
@@ -277,6 +278,7 @@ double path_length(const std::vector<Dot>& dots) {
 DotSequence place_dots(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
                        SampleReport* report, const Progress& progress) {
   CHECK(&curve.mesh() == &tone.mesh());
+  if (options.sampler == Sampler::kBlue) return place_blue(curve, tone, options, report, progress);
   const CurveMass mass = measure_curve(curve.implementation(), tone);
   const std::uint64_t count = count_of(options, mass.total());
   SampleReport figures;
