@@ -1,0 +1,81 @@
+#include "sampling/relax/stratum_places.h"
+
+#include <tbb/parallel_for.h>
+
+#include <bit>
+#include <cmath>
+
+#include "sampling/check.h"
+
+namespace hilbrush {
+namespace {
+
+/// A stratum is about one spacing wide; places further apart than this are on two sides of a gap.
+constexpr double kWidest = 2.5;
+
+/// The places within kWidest spacings of the one that has most of the others so near.
+std::uint8_t open_places(const PlacedStrata& strata, std::size_t s, double spacing_m) {
+  const double widest2 = std::pow(kWidest * spacing_m, 2);
+  std::uint8_t best = 0;
+  for (std::size_t a = 0; a < kPlacesAStratum; ++a) {
+    std::uint8_t near = 0;
+    for (std::size_t b = 0; b < kPlacesAStratum; ++b)
+      if ((strata.place(s, b).position_O - strata.place(s, a).position_O).squaredNorm() <= widest2)
+        near = static_cast<std::uint8_t>(near | 1u << b);
+    if (std::popcount(near) > std::popcount(best)) best = near;
+  }
+  return best;
+}
+
+PlacedStratum measure(const PlacedStrata& strata, std::size_t s, const ToneField& tone, double dot_mass_m2) {
+  // The mean over places of equal mass is weighted by mass: where a stratum has a dark and a light part it keeps to the
+  // dark one, where neighbours are near.
+  double asked = 0;
+  for (std::size_t p = 0; p < kPlacesAStratum; p += 2) {
+    const SurfacePlace& place = strata.place(s, p);
+    asked += tone.asked(surface_point_at(tone.mesh(), place.triangle, place.position_O)) * 2 / kPlacesAStratum;
+  }
+  PlacedStratum stratum;
+  stratum.spacing_m = std::sqrt(dot_mass_m2 / std::max(asked, 1e-4));
+  stratum.open_places = open_places(strata, s, stratum.spacing_m);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
+  for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
+    if (!(stratum.open_places >> p & 1u)) continue;
+    middle += strata.place(s, p).position_O;
+    normal += tone.mesh().area_vector(strata.place(s, p).triangle).normalized();
+  }
+  stratum.middle_O = middle / std::popcount(stratum.open_places);
+  const int first = std::countr_zero(stratum.open_places);
+  stratum.normal_O = normal.norm() > .1 ? Eigen::Vector3d(normal.normalized())
+                                        : tone.mesh().area_vector(strata.place(s, first).triangle).normalized();
+  for (std::size_t p = 0; p < kPlacesAStratum; ++p)
+    if (stratum.open_places >> p & 1u)
+      stratum.radius_m = std::max(stratum.radius_m, (strata.place(s, p).position_O - stratum.middle_O).norm());
+  return stratum;
+}
+
+}  // namespace
+
+PlacedStrata place_strata(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
+                          std::uint64_t count, SampleReport& report, const Progress& progress) {
+  SampleOptions even = options;
+  even.sampler = Sampler::kEven;
+  even.pitch_m.reset();
+  even.dot_count = kPlacesAStratum * count;
+  even.dot_limit = *even.dot_count;
+  PlacedStrata strata;
+  {
+    const DotSequence sequence = place_dots(curve, tone, even, &report, progress);
+    CHECK_EQ(sequence.dots.size(), kPlacesAStratum * count);
+    strata.places.reserve(sequence.dots.size());
+    for (const Dot& dot : sequence.dots) strata.places.push_back({dot.position_O, dot.triangle, dot.component});
+    const double dot_mass_m2 = kPlacesAStratum * sequence.pitch_m * sequence.pitch_m;
+    strata.pitch_m = std::sqrt(dot_mass_m2);
+    strata.strata.resize(count);
+    tbb::parallel_for(std::size_t{0}, strata.strata.size(),
+                      [&](std::size_t s) { strata.strata[s] = measure(strata, s, tone, dot_mass_m2); });
+  }
+  return strata;
+}
+
+}  // namespace hilbrush
