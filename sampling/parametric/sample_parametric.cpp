@@ -144,10 +144,10 @@ class Sampling {
   void walk_masses(std::size_t node, Visit&& visit) const {
     double before = mass_before_[node];
     walk(node, [&](const NodeOf& leaf, const VertexArea& vertex) {
-      const double mass = mass_of(vertex);
-      if (!(mass > 0)) return;
-      visit(leaf, before, before + mass);
-      before += mass;
+      const double after = before + mass_of(vertex);
+      if (!(after > before)) return;
+      visit(leaf, before, after);
+      before = after;
     });
   }
 

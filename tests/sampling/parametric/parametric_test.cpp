@@ -142,7 +142,8 @@ TEST(SampleParametric, CountIsExactForEverySamplerCurveAreaAndShape) {
         const ParametricSamples samples = sample_parametric(*surface, options);
         ASSERT_EQ(samples.dots.size(), 777u);
         for (const ParametricDot& dot : samples.dots) {
-          ASSERT_TRUE((dot.uv.array() >= 0).all() && (dot.uv.array() <= 1).all()) << name_of(shape);
+          ASSERT_TRUE((dot.uv.array() >= 0).all() && (dot.uv.array() <= 1).all())
+              << name_of(shape) << " " << dot.uv.transpose() << " sampler " << static_cast<int>(sampler);
           ASSERT_TRUE(dot.position.isApprox(surface->position(dot.uv)) || dot.position.norm() < 1e-9);
           ASSERT_NEAR(dot.normal.norm(), 1, 1e-12);
         }
