@@ -3,6 +3,7 @@
 
 #include "sampling/check.h"
 #include "sampling/curve/hilbert.h"
+#include "sampling/curve/peano.h"
 #include "sampling/quality.h"
 #include "sampling/quality/test_shapes.h"
 
@@ -26,25 +27,19 @@ Vector2d hilbert_vertex(std::uint64_t index, int depth) {
   return corner + Vector2d::Constant(size / 2);
 }
 
-/// Peano's curve, switchbacks all standing: nine children in three columns, up, down, up; a child is mirrored
-/// left-right in odd columns' rows and upside down in the middle column (Peano 1890; the second curve of the thesis's
-/// section 2.2.2).
+/// Middle of the index-th of 9^depth squares along the Peano II curve.
 Vector2d peano_vertex(std::uint64_t index, int depth) {
   std::uint64_t scale = 1;
-  for (int i = 1; i < depth; ++i) scale *= 9;
+  for (int i = 1; i < depth; ++i) scale *= PeanoQuad::kChildCount;
+  PeanoQuad quad;
   Vector2d corner = Vector2d::Zero();
   double size = 1;
-  bool flips_x = false, flips_y = false;
-  for (int level = 0; level < depth; ++level, scale /= 9) {
-    const auto child = static_cast<unsigned>(index / scale % 9);
-    unsigned column = child / 3, row = column == 1 ? 2 - child % 3 : child % 3;
-    const bool next_x = flips_x != (row == 1), next_y = flips_y != (column == 1);
-    if (flips_x) column = 2 - column;
-    if (flips_y) row = 2 - row;
-    size /= 3;
-    corner += size * Vector2d(column, row);
-    flips_x = next_x;
-    flips_y = next_y;
+  for (; scale > 0; scale /= PeanoQuad::kChildCount) {
+    const auto child = static_cast<unsigned>(index / scale % PeanoQuad::kChildCount);
+    const unsigned place = quad.place(child);
+    size /= PeanoQuad::kSide;
+    corner += size * Vector2d(place % PeanoQuad::kSide, place / PeanoQuad::kSide);
+    quad = quad.child(child);
   }
   return corner + Vector2d::Constant(size / 2);
 }
