@@ -176,7 +176,7 @@ class Sampling {
       const std::uint64_t end = n + 1 == nodes_.size() ? dots.size() : first_at(mass_before_[n + 1]);
       if (next == end) return;
       double threshold = sequence.at(next) * total();
-      NodeOf last;
+      NodeOf last = nodes_[n];
       walk_masses(n, [&](const NodeOf& leaf, double before, double after) {
         last = leaf;
         while (next < end && threshold < after) {
