@@ -13,26 +13,6 @@
 
 namespace hilbrush::commands_test {
 
-namespace fs = std::filesystem;
-
-TemporaryFolder::TemporaryFolder() {
-  std::string pattern = (fs::temp_directory_path() / "hilbrush-test-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-  path_ = pattern;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code error;
-  fs::remove_all(path_, error);
-}
-
-std::string TemporaryFolder::write(const std::string& name, const std::string& text, bool is_program) const {
-  const fs::path file = path_ / name;
-  std::ofstream(file, std::ios::binary) << text;
-  if (is_program) fs::permissions(file, fs::perms::owner_all);
-  return file.string();
-}
-
 std::string Peer::read_line() {
   std::size_t end = 0;
   while ((end = buffer_.find('\n')) == std::string::npos) {

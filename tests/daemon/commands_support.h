@@ -1,5 +1,4 @@
 #pragma once
-#include <filesystem>
 #include <functional>
 #include <sstream>
 #include <string>
@@ -7,25 +6,13 @@
 #include <vector>
 
 #include "daemon/commands/command_line.h"
+#include "tests/support/temporary_folder.h"
 
-/// What the tests of the operator's command share: a daemon that follows a script, a folder of their own, and the
+/// What the tests of the operator's command share: a daemon that follows a script, and the
 /// command with its streams.
 namespace hilbrush::commands_test {
 
-/// A new folder, removed with the object.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  /// Writes a file and returns its path.
-  std::string write(const std::string& name, const std::string& text, bool is_program = false) const;
-
- private:
-  std::filesystem::path path_;
-};
+using testing_support::TemporaryFolder;
 
 /// One accepted connection, from the daemon's side.
 class Peer {

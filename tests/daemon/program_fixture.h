@@ -8,6 +8,7 @@
 
 #include "planner/cell_description.h"
 #include "planner/exposure_program.h"
+#include "tests/support/temporary_folder.h"
 
 /// Cells and programs small enough to reason about: no mesh, no planner; positions follow from nothing but the joints.
 namespace hilbrush::test {
@@ -72,24 +73,6 @@ inline ExposureProgram small_program(std::size_t count, unsigned seed = 1) {
   return program;
 }
 
-/// A folder of its own, gone with the test.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "hilbrush-test-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
+using testing_support::TemporaryFolder;
 
 }  // namespace hilbrush::test

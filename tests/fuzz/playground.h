@@ -11,6 +11,7 @@
 #include <string>
 
 #include "sampling/images/image_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace hilbrush {
 
@@ -20,12 +21,9 @@ class Playground {
  public:
   /// @throws std::filesystem::filesystem_error if it can't be made
   Playground();
-  ~Playground();
-  Playground(const Playground&) = delete;
-  Playground& operator=(const Playground&) = delete;
 
   const std::filesystem::path& folder() const { return folder_; }
-  const std::filesystem::path& outer() const { return outer_; }
+  const std::filesystem::path& outer() const { return outer_.path(); }
   /// File name to bytes of the models in the corpus.
   const std::map<std::string, std::string>& models() const { return models_; }
   /// One small picture of each format that is read.
@@ -35,7 +33,8 @@ class Playground {
   std::filesystem::path write(const std::string& name, const std::string& bytes) const;
 
  private:
-  std::filesystem::path outer_, folder_;
+  testing_support::TemporaryFolder outer_;
+  const std::filesystem::path folder_ = outer_ / "model";
   std::map<std::string, std::string> models_, images_;
 };
 
@@ -98,10 +97,6 @@ inline std::string bytes_of(const std::filesystem::path& file) {
 }
 
 inline Playground::Playground() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "hilbrush-fuzz-XXXXXX").string();
-  if (!mkdtemp(pattern.data())) throw std::runtime_error("can't make a folder like " + pattern);
-  outer_ = std::filesystem::canonical(pattern);
-  folder_ = outer_ / "model";
   std::filesystem::create_directories(folder_);
   for (const auto& entry :
        std::filesystem::directory_iterator(std::filesystem::path(__FILE__).parent_path() / "corpus")) {
@@ -123,12 +118,7 @@ inline Playground::Playground() {
   std::filesystem::copy_file(folder_ / "gradient.png", outer_ / "outside.png");
   std::filesystem::create_symlink(outer_ / "outside.wrl", folder_ / "leak.wrl");
   std::filesystem::create_symlink("../outside.png", folder_ / "leak.png");
-  std::filesystem::create_directory_symlink(outer_, folder_ / "up");
-}
-
-inline Playground::~Playground() {
-  std::error_code ignored;
-  std::filesystem::remove_all(outer_, ignored);
+  std::filesystem::create_directory_symlink(outer_.path(), folder_ / "up");
 }
 
 inline std::filesystem::path Playground::write(const std::string& name, const std::string& bytes) const {

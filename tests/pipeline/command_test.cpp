@@ -6,6 +6,7 @@
 #include "tests/pipeline/painting.h"
 #include "tests/pipeline/report_expectations.h"
 #include "tests/support/shell.h"
+#include "tests/support/temporary_folder.h"
 
 /// The programs as a person or a script runs them: exit codes, sentences, files.
 namespace hilbrush::testing_pipeline {

@@ -14,6 +14,7 @@
 #include "sampling/placement.h"
 #include "sim/devices/sim_cell.h"
 #include "tests/support/shell.h"
+#include "tests/support/temporary_folder.h"
 
 namespace hilbrush::testing_pipeline {
 namespace fs = std::filesystem;

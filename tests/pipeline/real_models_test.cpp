@@ -8,6 +8,7 @@
 
 #include "tests/pipeline/report_expectations.h"
 #include "tests/support/shell.h"
+#include "tests/support/temporary_folder.h"
 
 /// Models that other people made, through the command. They are not part of the project: HILBRUSH_TEST_MODELS says
 /// where they are.

@@ -10,6 +10,7 @@
 #include "tests/pipeline/painting.h"
 #include "tests/pipeline/report_expectations.h"
 #include "tests/support/shell.h"
+#include "tests/support/temporary_folder.h"
 
 /// Model in, pictures out, through the functions that the programs call.
 namespace hilbrush::testing_pipeline {

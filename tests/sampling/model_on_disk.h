@@ -1,13 +1,10 @@
 #pragma once
-#include <unistd.h>
-
 #include <filesystem>
-#include <fstream>
-#include <stdexcept>
 #include <string>
 
 #include "sampling/input_error.h"
 #include "sampling/model_file.h"
+#include "tests/support/temporary_folder.h"
 
 /// Models that tests write themselves.
 namespace hilbrush {
@@ -15,26 +12,12 @@ namespace hilbrush {
 /// A folder of the test's own, gone at its end.
 class ModelOnDisk {
  public:
-  ModelOnDisk() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "hilbrush-model-XXXXXX").string();
-    if (!mkdtemp(pattern.data())) throw std::runtime_error("no temporary folder");
-    outer_ = std::filesystem::canonical(pattern);
-    std::filesystem::create_directories(outer_ / "model");
-  }
-  ~ModelOnDisk() {
-    std::error_code ignored;
-    std::filesystem::remove_all(outer_, ignored);
-  }
-  ModelOnDisk(const ModelOnDisk&) = delete;
-  ModelOnDisk& operator=(const ModelOnDisk&) = delete;
+  ModelOnDisk() { std::filesystem::create_directories(folder()); }
 
-  std::filesystem::path folder() const { return outer_ / "model"; }
-  std::filesystem::path outer() const { return outer_; }
+  std::filesystem::path folder() const { return outer() / "model"; }
+  std::filesystem::path outer() const { return outer_.path(); }
   std::filesystem::path write(const std::string& name, const std::string& bytes) const {
-    const std::filesystem::path file = folder() / name;
-    std::filesystem::create_directories(file.parent_path());
-    std::ofstream(file, std::ios::binary) << bytes;
-    return file;
+    return outer_.write("model/" + name, bytes);
   }
   Model load(const std::string& name, const std::string& bytes, const ModelLimits& limits = {}) const {
     return load_model(write(name, bytes), fake_image, limits);
@@ -68,7 +51,7 @@ class ModelOnDisk {
   }
 
  private:
-  std::filesystem::path outer_;
+  testing_support::TemporaryFolder outer_;
 };
 
 /// Of a closed mesh; positive if its triangles run counter-clockwise seen from outside.

@@ -6,18 +6,13 @@
 #include <fstream>
 #include <sstream>
 
+#include "tests/support/temporary_folder.h"
+
 namespace hilbrush {
 namespace {
 
 class EmissionRecord : public ::testing::Test {
  protected:
-  EmissionRecord() {
-    std::string name = (std::filesystem::temp_directory_path() / "emissions-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-    file_ = folder_ / "emissions.rec";
-  }
-  ~EmissionRecord() override { std::filesystem::remove_all(folder_); }
-
   static Emission emission(int i) {
     Emission e;
     for (int k = 0; k < kAxisCount; ++k) e.joints[k] = i + .1 * k;
@@ -49,7 +44,8 @@ class EmissionRecord : public ::testing::Test {
     }
   }
 
-  std::filesystem::path folder_, file_;
+  testing_support::TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "emissions.rec";
 };
 
 TEST_F(EmissionRecord, ReadsBackWhatWasAppendedOverSeveralOpenings) {
@@ -104,7 +100,7 @@ TEST_F(EmissionRecord, OtherFilesAndAbsentOnesAreRefusedByName) {
   EXPECT_THROW(read_emission_record(file_), std::runtime_error);
   EXPECT_THROW(EmissionRecordFile record(file_), std::runtime_error);
   EXPECT_EQ(bytes(), "ply\nformat ascii 1.0\n");  // and left as they are
-  EXPECT_THROW(EmissionRecordFile record(folder_ / "absent" / "record"), std::runtime_error);
+  EXPECT_THROW(EmissionRecordFile record(folder_ / "absent/record"), std::runtime_error);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "sampling/images/image_file.h"
 #include "sim/film/canvas.h"
 #include "tests/sim/test_objects.h"
+#include "tests/support/temporary_folder.h"
 
 namespace hilbrush {
 namespace {
@@ -83,12 +84,7 @@ TEST(OrthographicView, AFaceSeenFromBehindIsNoFilm) {
 
 class Pictures : public ::testing::Test {
  protected:
-  Pictures() {
-    std::string name = (std::filesystem::temp_directory_path() / "pictures-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~Pictures() override { std::filesystem::remove_all(folder_); }
-  std::filesystem::path folder_;
+  testing_support::TemporaryFolder folder_;
 };
 
 TEST_F(Pictures, ShowWantedPaintedAndErrorWhereTheyAre) {
@@ -105,7 +101,7 @@ TEST_F(Pictures, ShowWantedPaintedAndErrorWhereTheyAre) {
   const ToneField tone(mesh, {});
   const Film film(mesh, cell, 1e-3);
   const std::vector<Vector3d> skipped{{r / 2, 0, r / 2}};
-  const auto files = write_pictures(film, tone, skipped, folder_);
+  const auto files = write_pictures(film, tone, skipped, folder_.path());
   ASSERT_EQ(files.size(), 7u);
   for (const auto& file : files) EXPECT_TRUE(std::filesystem::is_regular_file(file)) << file;
   EXPECT_EQ(files[0], folder_ / "views" / "front.png");

@@ -1,6 +1,5 @@
 #include "tests/support/shell.h"
 
-#include <stdlib.h>
 #include <sys/wait.h>
 
 #include <array>
@@ -8,8 +7,6 @@
 #include <stdexcept>
 
 namespace hilbrush::testing_support {
-namespace fs = std::filesystem;
-
 CommandResult run_command(const std::string& command) {
   CommandResult result;
   FILE* pipe = popen(("( " + command + " ) 2>&1").c_str(), "r");
@@ -31,17 +28,6 @@ std::string quoted(const std::string& text) {
 std::string find_program(const std::string& name) {
   const CommandResult result = run_command("command -v " + name);
   return result.exit_code == 0 ? result.output.substr(0, result.output.find('\n')) : "";
-}
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (fs::temp_directory_path() / "hilbrush-test-XXXXXX").string();
-  if (!mkdtemp(name.data())) throw std::runtime_error("can't make " + name);
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
 }
 
 }  // namespace hilbrush::testing_support

@@ -1,5 +1,4 @@
 #pragma once
-#include <filesystem>
 #include <string>
 
 /// What tests need of the system around them.
@@ -17,18 +16,5 @@ std::string quoted(const std::string& text);
 
 /// The full path of a program, or "".
 std::string find_program(const std::string& name);
-
-/// A new folder that goes with the object.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace hilbrush::testing_support
