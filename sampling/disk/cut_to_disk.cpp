@@ -5,19 +5,22 @@
 #include <limits>
 #include <numeric>
 #include <queue>
-#include <tuple>
 #include <utility>
+
+#include "sampling/disk/refine.h"
 
 namespace hilbrush {
 namespace {
 
 /// Sides of an outer boundary are split until none is longer than this share of all of it.
 constexpr double kLongestBoundarySide = 1. / 16;
-/// Coarser components are refined: a box of twelve triangles has too few vertices for a smooth map.
-constexpr std::size_t kFewestFaces = 500;
-/// A hole with a longer rim, as a share of the outer one, is joined to it by a cut instead of filled: an open tube
-/// becomes a strip.
-constexpr double kLongestFilledRim = .6;
+/// A mesh is refined to so many faces, shared out by area, and no component to more than kFewestFaces.
+constexpr double kFewestFacesOfMesh = 20'000, kFewestFaces = 5000;
+/// Towards Delaunay a mesh is refined to so many, but no component to more than kMostGrowth times its own; all to
+/// kLeastGrowth times their own if they need it.
+constexpr double kDelaunayFacesOfMesh = 80'000, kMostGrowth = 16, kLeastGrowth = 1.1;
+/// So many roots are tried for the loops that open handles.
+constexpr int kRootCount = 4;
 
 /// Shortest paths along edges from one vertex to all others.
 struct Distances {
@@ -49,28 +52,6 @@ struct Arcs {
   }
 };
 
-/// Splits the longest edges until there are enough faces.
-void refine(Disk& disk) {
-  using Entry = std::tuple<double, std::uint32_t, std::uint8_t>;
-  std::priority_queue<Entry> queue;
-  const auto push_sides = [&](std::uint32_t f) {
-    for (std::uint8_t s = 0; s < 3; ++s) queue.push({disk.length({f, s}), f, s});
-  };
-  for (std::uint32_t f = 0; f < disk.faces().size(); ++f) push_sides(f);
-  while (disk.faces().size() < kFewestFaces) {
-    const auto [length, f, s] = queue.top();
-    queue.pop();
-    if (disk.length({f, s}) != length) continue;  // has been split since
-    const TriangleSide across = disk.neighbours()[f][s];
-    const auto first_new = static_cast<std::uint32_t>(disk.faces().size());
-    disk.split_edge({f, s});
-    push_sides(f);
-    if (across != kNoSide) push_sides(across.triangle);
-    for (std::uint32_t added = first_new; added < disk.faces().size(); ++added) push_sides(added);
-  }
-}
-
-/// Along edges, but along a boundary only with its sides.
 Distances distances_from(const std::vector<std::uint32_t>& sources, const Disk& disk, const Arcs& arcs) {
   Distances d;
   d.to_vertex.assign(disk.positions().size(), std::numeric_limits<double>::infinity());
@@ -97,29 +78,24 @@ Distances distances_from(const std::vector<std::uint32_t>& sources, const Disk& 
   return d;
 }
 
-/// Cuts a closed surface of genus 0 open along its approximate diameter. Returns the vertex at one end.
-std::uint32_t cut_along_diameter(Disk& disk) {
+std::vector<TriangleSide> path_to_source(const Disk& disk, const Distances& distances, std::uint32_t v) {
+  std::vector<TriangleSide> path;
+  for (; distances.last_side[v] != kNoSide; v = disk.from(path.back())) path.push_back(distances.last_side[v]);
+  return path;
+}
+
+/// The edges of a closed surface's approximate diameter, from its far end to the near one.
+std::vector<TriangleSide> diameter(const Disk& disk) {
   const Arcs arcs(disk);
   const std::uint32_t one_end = distances_from({0}, disk, arcs).farthest();
   const Distances distances = distances_from({one_end}, disk, arcs);
-  std::vector<TriangleSide> path;
-  for (std::uint32_t v = distances.farthest(); v != one_end; v = disk.from(path.back()))
-    path.push_back(distances.last_side[v]);
-  for (const TriangleSide s : path) disk.cut_edge(s);
-  disk.finish_cuts();
-  return disk.from(path.back());
+  return path_to_source(disk, distances, distances.farthest());
 }
 
-double length_of(const Disk& disk, const BoundaryLoop& loop) {
+double length_of(const Disk& disk, const std::vector<TriangleSide>& sides) {
   double sum = 0;
-  for (const TriangleSide s : loop) sum += disk.length(s);
+  for (const TriangleSide s : sides) sum += disk.length(s);
   return sum;
-}
-
-std::vector<std::uint32_t> vertices_of(const Disk& disk, const BoundaryLoop& loop) {
-  std::vector<std::uint32_t> vertices;
-  for (const TriangleSide s : loop) vertices.push_back(disk.from(s));
-  return vertices;
 }
 
 /// Longest loop first.
@@ -129,25 +105,116 @@ std::vector<BoundaryLoop> sorted_loops(const Disk& disk) {
   return loops;
 }
 
-/// Cuts along the shortest path from the longest loop to each other long one. Returns the places where the cuts end.
-std::vector<Eigen::Vector3d> join_long_rims(Disk& disk) {
-  std::vector<Eigen::Vector3d> ends;
-  const double shortest_joined = kLongestFilledRim * length_of(disk, sorted_loops(disk).front());
-  while (true) {
-    const std::vector<BoundaryLoop> loops = sorted_loops(disk);
-    if (loops.size() < 2 || length_of(disk, loops[1]) < shortest_joined) return ends;
-    const Distances distances = distances_from(vertices_of(disk, loops[0]), disk, Arcs(disk));
-    const auto rim = vertices_of(disk, loops[1]);
-    std::uint32_t v = *std::ranges::min_element(rim, {}, [&](std::uint32_t r) { return distances.to_vertex[r]; });
-    ends.push_back(disk.positions()[v]);
-    std::vector<TriangleSide> path;
-    for (; distances.last_side[v] != kNoSide; v = disk.from(distances.last_side[v]))
-      path.push_back(distances.last_side[v]);
-    ends.push_back(disk.positions()[v]);
-    if (path.empty()) return ends;
-    for (const TriangleSide s : path) disk.cut_edge(s);
-    disk.finish_cuts();
+/// The edges that close the shortest ways from source to source which cut the surface to a disk: a forest of shortest
+/// paths, a tree of faces across other edges, those in the longest ways first; each edge in neither closes one. With
+/// one vertex as the source these are loops (Erickson and Whittlesey, "Greedy optimal homotopy and homology
+/// generators", 2005), with the boundaries as sources arcs between them.
+std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& distances) {
+  struct Candidate {
+    double length;
+    TriangleSide side;
+  };
+  std::vector<Candidate> candidates;
+  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
+    for (std::uint8_t s = 0; s < 3; ++s) {
+      const TriangleSide side{f, s}, across = disk.neighbours()[f][s];
+      if (across == kNoSide || across.triangle < f || (across.triangle == f && across.side < s)) continue;
+      const TriangleSide to_from = distances.last_side[disk.from(side)], to_to = distances.last_side[disk.to(side)];
+      if (to_from == side || to_from == across || to_to == side || to_to == across) continue;
+      candidates.push_back(
+          {distances.to_vertex[disk.from(side)] + distances.to_vertex[disk.to(side)] + disk.length(side), side});
+    }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.length > b.length; });
+  std::vector<std::uint32_t> parent(disk.faces().size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto find = [&](std::uint32_t f) {
+    while (parent[f] != f) f = parent[f] = parent[parent[f]];
+    return f;
+  };
+  std::vector<TriangleSide> closing;
+  for (const Candidate& candidate : candidates) {
+    const std::uint32_t a = find(candidate.side.triangle);
+    const std::uint32_t b = find(disk.neighbours()[candidate.side.triangle][candidate.side.side].triangle);
+    if (a != b)
+      parent[a] = b;
+    else
+      closing.push_back(candidate.side);
   }
+  return closing;
+}
+
+/// The closing edges and the paths from both ends of each to a source; of a single vertex without the stem that all
+/// loops share.
+std::vector<TriangleSide> cut_graph(const Disk& disk, const Distances& distances,
+                                    const std::vector<char>& is_boundary) {
+  std::vector<TriangleSide> cut = closing_edges(disk, distances);
+  std::vector<char> is_reached(disk.positions().size(), 0);
+  for (std::size_t i = 0, n = cut.size(); i < n; ++i)
+    for (std::uint32_t v : {disk.from(cut[i]), disk.to(cut[i])})
+      for (; !is_reached[v] && distances.last_side[v] != kNoSide; v = disk.from(cut.back())) {
+        is_reached[v] = 1;
+        cut.push_back(distances.last_side[v]);
+      }
+  std::vector<std::vector<std::size_t>> edges_at(disk.positions().size());
+  for (std::size_t i = 0; i < cut.size(); ++i)
+    for (const auto v : {disk.from(cut[i]), disk.to(cut[i])}) edges_at[v].push_back(i);
+  std::vector<char> is_dropped(cut.size(), 0);
+  for (std::uint32_t v = 0; v < edges_at.size(); ++v)
+    for (std::uint32_t end = v; edges_at[end].size() == 1 && !is_boundary[end];) {
+      const std::size_t edge = edges_at[end].front();
+      is_dropped[edge] = 1;
+      const std::uint32_t other = disk.from(cut[edge]) == end ? disk.to(cut[edge]) : disk.from(cut[edge]);
+      edges_at[end].clear();
+      std::erase(edges_at[other], edge);
+      end = other;
+    }
+  std::vector<TriangleSide> kept;
+  for (std::size_t i = 0; i < cut.size(); ++i)
+    if (!is_dropped[i]) kept.push_back(cut[i]);
+  return kept;
+}
+
+std::vector<char> boundary_vertices(const Disk& disk) {
+  std::vector<char> is_boundary(disk.positions().size(), 0);
+  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
+    for (std::uint8_t s = 0; s < 3; ++s)
+      if (disk.neighbours()[f][s] == kNoSide) is_boundary[disk.from({f, s})] = is_boundary[disk.to({f, s})] = 1;
+  return is_boundary;
+}
+
+/// The shortest of the cut graphs from a few far-apart vertices.
+std::vector<TriangleSide> shortest_loops(const Disk& disk) {
+  const Arcs arcs(disk);
+  const std::vector<char> none(disk.positions().size(), 0);
+  std::vector<TriangleSide> best;
+  std::uint32_t root = 0;
+  for (int i = 0; i < kRootCount; ++i) {
+    const Distances distances = distances_from({root}, disk, arcs);
+    std::vector<TriangleSide> cut = cut_graph(disk, distances, none);
+    if (best.empty() || length_of(disk, cut) < length_of(disk, best)) best = std::move(cut);
+    // From the first root to far ends, then from the middle of what was best.
+    root = i + 2 < kRootCount ? distances.farthest() : disk.from(best[best.size() / 2]);
+  }
+  return best;
+}
+
+std::vector<TriangleSide> shortest_arcs(const Disk& disk, const std::vector<char>& is_boundary) {
+  std::vector<std::uint32_t> sources;
+  for (std::uint32_t v = 0; v < is_boundary.size(); ++v)
+    if (is_boundary[v]) sources.push_back(v);
+  return cut_graph(disk, distances_from(sources, disk, Arcs(disk)), is_boundary);
+}
+
+/// Places where the cut meets itself or a boundary.
+std::vector<Eigen::Vector3d> forks_of(const Disk& disk, const std::vector<TriangleSide>& cut,
+                                      const std::vector<char>& is_boundary) {
+  std::vector<int> degree(disk.positions().size(), 0);
+  for (const TriangleSide side : cut) ++degree[disk.from(side)], ++degree[disk.to(side)];
+  std::vector<Eigen::Vector3d> forks;
+  for (std::size_t v = 0; v < degree.size(); ++v)
+    if (degree[v] > (is_boundary[v] ? 0 : 2)) forks.push_back(disk.positions()[v]);
+  return forks;
 }
 
 /// The loop of a disk, beginning at a vertex.
@@ -174,39 +241,6 @@ void split_long_sides(CutDisk& cut) {
   }
 }
 
-/// Cuts along each closing edge and the paths from both its ends to the root of the tree, but for the stem that all
-/// loops share.
-/// Returns the places where cuts meet.
-std::vector<Eigen::Vector3d> cut_loops(Disk& disk, const Distances& distances,
-                                       const std::vector<TriangleSide>& closing) {
-  std::vector<char> is_cut_vertex(disk.positions().size(), 0);
-  std::vector<TriangleSide> cut = closing;
-  for (const TriangleSide side : closing)
-    for (std::uint32_t v : {disk.from(side), disk.to(side)})
-      for (; !is_cut_vertex[v] && distances.last_side[v] != kNoSide; v = disk.from(distances.last_side[v])) {
-        is_cut_vertex[v] = 1;
-        cut.push_back(distances.last_side[v]);
-      }
-  std::vector<int> degree(disk.positions().size(), 0);
-  for (const TriangleSide side : cut) ++degree[disk.from(side)], ++degree[disk.to(side)];
-  // Only the root can be a loose end; take its stem away edge by edge.
-  for (bool is_loose = true; is_loose;) {
-    const auto loose = std::find_if(cut.begin(), cut.end(), [&](TriangleSide side) {
-      return degree[disk.from(side)] == 1 || degree[disk.to(side)] == 1;
-    });
-    is_loose = loose != cut.end();
-    if (!is_loose) break;
-    --degree[disk.from(*loose)], --degree[disk.to(*loose)];
-    cut.erase(loose);
-  }
-  std::vector<Eigen::Vector3d> forks;
-  for (std::size_t v = 0; v < degree.size(); ++v)
-    if (degree[v] > 2) forks.push_back(disk.positions()[v]);
-  for (const TriangleSide side : cut) disk.cut_edge(side);
-  disk.finish_cuts();
-  return forks;
-}
-
 /// The vertices of a loop that lie at one of the places.
 std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loop,
                                        const std::vector<Eigen::Vector3d>& places) {
@@ -216,82 +250,79 @@ std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loo
   return vertices;
 }
 
-/// Cuts a closed surface with handles open along the shortest loops through one vertex that leave no handle (Erickson
-/// and Whittlesey, "Greedy optimal homotopy and homology generators", 2005): a tree of shortest paths, a tree of faces
-/// across other edges, longest loops first; each edge that neither tree has closes a loop. Returns the places where
-/// loops meet.
-std::vector<Eigen::Vector3d> cut_handles(Disk& disk) {
-  const Distances distances = distances_from({0}, disk, Arcs(disk));
-  struct Candidate {
-    double loop_length;
-    TriangleSide side;
-  };
-  std::vector<Candidate> candidates;
-  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
-    for (std::uint8_t s = 0; s < 3; ++s) {
-      const TriangleSide side{f, s}, across = disk.neighbours()[f][s];
-      if (across.triangle < f || (across.triangle == f && across.side < s)) continue;
-      const TriangleSide to_from = distances.last_side[disk.from(side)], to_to = distances.last_side[disk.to(side)];
-      if (to_from == side || to_from == across || to_to == side || to_to == across) continue;
-      candidates.push_back(
-          {distances.to_vertex[disk.from(side)] + distances.to_vertex[disk.to(side)] + disk.length(side), side});
-    }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.loop_length > b.loop_length; });
-  std::vector<std::uint32_t> parent(disk.faces().size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&](std::uint32_t f) {
-    while (parent[f] != f) f = parent[f] = parent[parent[f]];
-    return f;
-  };
-  std::vector<TriangleSide> cut;
-  for (const Candidate& candidate : candidates) {
-    const std::uint32_t a = find(candidate.side.triangle);
-    const std::uint32_t b = find(disk.neighbours()[candidate.side.triangle][candidate.side.side].triangle);
-    if (a != b)
-      parent[a] = b;
-    else
-      cut.push_back(candidate.side);
-  }
-  return cut_loops(disk, distances, cut);
+void refine_for_map(Disk& disk, double area_share) {
+  refine(disk, static_cast<std::size_t>(std::min(kFewestFacesOfMesh * area_share, kFewestFaces)));
+  const auto n = static_cast<double>(disk.faces().size());
+  const double most = std::max(kLeastGrowth * n, std::min(kMostGrowth * n, kDelaunayFacesOfMesh * area_share));
+  split_towards_delaunay(disk, static_cast<std::size_t>(most));
+}
+
+/// Where a boundary loop may begin, and the corners of the shape: vertices change their numbers when cuts are opened.
+struct Marks {
+  std::vector<Eigen::Vector3d> forks;
+  std::optional<TriangleSide> start;
+};
+
+/// Takes the edges apart and finds the outer loop. False if the result has more than one.
+bool open_cuts(CutDisk& cut, const std::vector<TriangleSide>& edges, const Marks& marks) {
+  cut.is_cut = cut.is_cut || !edges.empty();
+  cut.cut_length_m += length_of(cut.disk, edges);
+  for (const TriangleSide side : edges) cut.disk.cut_edge(side);
+  cut.disk.finish_cuts();
+  std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbours());
+  if (loops.size() != 1) return false;
+  cut.outer = marks.start ? loop_from(cut.disk, cut.disk.from(*marks.start)) : std::move(loops.front());
+  cut.forks = vertices_at(cut.disk, cut.outer, marks.forks);
+  split_long_sides(cut);
+  return true;
+}
+
+void fill_holes(Disk& disk, std::size_t most_open) {
+  const std::vector<BoundaryLoop> loops = sorted_loops(disk);
+  for (std::size_t i = std::max<std::size_t>(1, most_open + 1); i < loops.size(); ++i) disk.fill(loops[i]);
 }
 
 }  // namespace
 
 std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
-                                   std::string& reason) {
+                                   std::string& reason, const CutOptions& options) {
   if (component.genus < 0) {
     reason = "its triangles do not form a surface";
     return std::nullopt;
   }
-  CutDisk cut{
-      Disk(mesh, neighbours, component.triangles), {}, component.boundary_loops == 0 || component.genus > 0, {}};
+  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, false, 0, {}};
   Disk& disk = cut.disk;
-  refine(disk);
-  std::vector<Eigen::Vector3d> forks;
-  std::uint32_t start = 0;
-  if (!cut.is_cut) {
-    forks = join_long_rims(disk);
-    cut.is_cut = !forks.empty();
-    const std::vector<BoundaryLoop> loops = sorted_loops(disk);
-    start = disk.from(loops[0][0]);
-    for (std::size_t i = 1; i < loops.size(); ++i) disk.fill(loops[i]);
+  refine_for_map(disk, options.area_share);
+  fill_holes(disk, options.most_holes);
+  const std::vector<char> is_boundary = boundary_vertices(disk);
+  std::vector<TriangleSide> edges;
+  Marks marks;
+  if (component.boundary_loops > 0) {
+    edges = shortest_arcs(disk, is_boundary);
+  } else if (component.genus > 0) {
+    edges = shortest_loops(disk);
   } else {
-    for (const BoundaryLoop& loop : boundary_loops(disk.neighbours())) disk.fill(loop);
-    if (component.genus > 0)
-      forks = cut_handles(disk);
-    else
-      start = cut_along_diameter(disk);
+    edges = diameter(disk);
+    marks.start = edges.back();
   }
-  const std::vector<BoundaryLoop> loops = boundary_loops(disk.neighbours());
-  if (loops.size() != 1) {
-    reason = "no cut was found that makes it a disk";
-    return std::nullopt;
-  }
-  cut.outer = forks.empty() ? loop_from(disk, start) : loops.front();
-  cut.forks = vertices_at(disk, cut.outer, forks);
-  split_long_sides(cut);
-  return cut;
+  if (!marks.start) marks.forks = forks_of(disk, edges, is_boundary);
+  if (open_cuts(cut, edges, marks)) return cut;
+  reason = "no cut was found that makes it a disk";
+  return std::nullopt;
+}
+
+bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {
+  const std::vector<char> is_boundary = boundary_vertices(cut.disk);
+  std::vector<std::uint32_t> sources;
+  for (const TriangleSide s : cut.outer) sources.push_back(cut.disk.from(s));
+  const Distances distances = distances_from(sources, cut.disk, Arcs(cut.disk));
+  const auto deepest = std::ranges::max_element(vertices, {}, [&](std::uint32_t v) { return distances.to_vertex[v]; });
+  if (deepest == vertices.end() || !(distances.to_vertex[*deepest] > 0)) return false;
+  const std::vector<TriangleSide> path = path_to_source(cut.disk, distances, *deepest);
+  Marks marks;
+  for (const auto v : cut.forks) marks.forks.push_back(cut.disk.positions()[v]);
+  if (!cut.forks.empty()) marks.forks.push_back(cut.disk.positions()[cut.disk.from(path.back())]);
+  return open_cuts(cut, path, marks);
 }
 
 }  // namespace hilbrush

@@ -4,23 +4,34 @@
 
 #include "sampling/disk/disk.h"
 
-/// Makes a topological disk of a component: closed ones are cut open, holes are filled.
+/// Makes a topological disk of a component: cut open along short paths.
 namespace hilbrush {
 
 struct CutDisk {
   Disk disk;
-  BoundaryLoop
-      outer;  ///< the one boundary, counter-clockwise seen from outside; of a cut it begins where the cut begins
+  /// The one boundary, counter-clockwise seen from outside; of a cut it begins where the cut begins.
+  BoundaryLoop outer;
   bool is_cut = false;
-  std::vector<std::uint32_t>
-      forks;  ///< boundary vertices where cuts meet, in order of `outer`: natural corners of the square
+  double cut_length_m = 0;
+  /// Boundary vertices where cuts meet each other or a boundary, in order of `outer`: natural corners of the square.
+  std::vector<std::uint32_t> forks;
 };
 
-/// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter; more branches
-/// shear the map and lengthen the curve). Handles: all boundaries are filled, then short loops through one vertex are
-/// cut. With boundaries: the longest loop is the outer one, the others are filled. Returns nothing, and a reason, for
-/// what is not a manifold. Cost O(n log n).
+struct CutOptions {
+  double area_share = 1;        ///< of the whole surface: what a component is worth refining for
+  std::size_t most_holes = 64;  ///< more boundaries than these, smallest first, are filled instead of cut open
+};
+
+/// Coarse and blunt-angled triangulations are refined first, within bounds.
+/// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter). Handles and
+/// several boundaries: along the shortest arcs from boundary to boundary (or from one vertex back to it) that leave a
+/// disk. A hole that is filled instead makes the curve jump across it. Returns nothing, and a reason, for what is not a
+/// manifold. Cost O(n log n).
 std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
-                                   std::string& reason);
+                                   std::string& reason, const CutOptions& options = {});
+
+/// Cuts from the boundary to that one of the given vertices that lies deepest inside: a long finger, which the map
+/// would shrink to nothing, is slit open. False if all of them are on the boundary.
+bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices);
 
 }  // namespace hilbrush

@@ -1,6 +1,8 @@
 #include "sampling/disk/disk.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace hilbrush {
@@ -23,17 +25,24 @@ Disk::Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::ve
   faces_ = fans.of_corners;
 }
 
-std::uint32_t Disk::split_edge(TriangleSide s) {
+double Disk::angle(std::uint32_t face, std::size_t corner) const {
+  const Triangle& f = faces_[face];
+  const Eigen::Vector3d& p = positions_[f[corner]];
+  const Eigen::Vector3d a = positions_[f[(corner + 1) % 3]] - p, b = positions_[f[(corner + 2) % 3]] - p;
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+std::uint32_t Disk::split_edge(TriangleSide s, double share) {
   const auto middle = static_cast<std::uint32_t>(positions_.size());
-  positions_.push_back(.5 * (positions_[from(s)] + positions_[to(s)]));
+  positions_.push_back((1 - share) * positions_[from(s)] + share * positions_[to(s)]);
   const TriangleSide across = neighbours_[s.triangle][s.side];
   // Cuts one face from the middle of a side to its apex: it keeps the first half, a new face takes the second.
-  const auto halve = [&](TriangleSide side) {
+  const auto halve = [&](TriangleSide side, double f_share) {
     const auto [f, i] = side;
     const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
     const auto added = static_cast<std::uint32_t>(faces_.size());
     FaceSource second = sources_[f];
-    const Eigen::Vector2d middle_b = .5 * (second.corners[i] + second.corners[j]);
+    const Eigen::Vector2d middle_b = (1 - f_share) * second.corners[i] + f_share * second.corners[j];
     second.corners = {middle_b, sources_[f].corners[j], sources_[f].corners[k]};
     sources_[f].corners[j] = middle_b;
     faces_.push_back({middle, faces_[f][j], faces_[f][k]});
@@ -45,9 +54,9 @@ std::uint32_t Disk::split_edge(TriangleSide s) {
     neighbours_[f][j] = {added, 2};
     return added;
   };
-  const std::uint32_t second = halve(s);
+  const std::uint32_t second = halve(s, share);
   if (across == kNoSide) return middle;
-  const std::uint32_t second_across = halve(across);
+  const std::uint32_t second_across = halve(across, 1 - share);
   neighbours_[s.triangle][s.side] = {second_across, 0};
   neighbours_[second_across][0] = s;
   neighbours_[second][0] = across;

@@ -31,8 +31,11 @@ class Disk {
   std::uint32_t to(TriangleSide s) const { return faces_[s.triangle][(s.side + 1) % 3]; }
   double length(TriangleSide s) const { return (positions_[to(s)] - positions_[from(s)]).norm(); }
 
-  /// Puts a vertex in the middle of an edge; side `s` then ends there. Returns the new vertex.
-  std::uint32_t split_edge(TriangleSide s);
+  /// Angle of a face at one of its corners, radians.
+  double angle(std::uint32_t face, std::size_t corner) const;
+
+  /// Puts a vertex on an edge, at a share of side `s`, which then ends there. Returns the new vertex.
+  std::uint32_t split_edge(TriangleSide s, double share = .5);
   /// Takes the given edges apart (call finish_cuts() after the last).
   void cut_edge(TriangleSide s);
   /// Gives each fan that the cuts have made a vertex of its own.

@@ -1,21 +1,11 @@
 #include "sampling/disk/square_map.h"
 
-// clang-format off
-#include <iostream>  // Eigen/MetisSupport prints, but does not say so
-#include <Eigen/MetisSupport>
-// clang-format on
-
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseLU>
+#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <numbers>
-#include <numeric>
 
-#include "sampling/check.h"
+#include "sampling/disk/convex_combination.h"
+#include "sampling/disk/corners.h"
 #include "sampling/disk/orientation.h"
 
 namespace hilbrush {
@@ -23,116 +13,16 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double kLeastWeight = 1e-2, kMostWeight = 1e3;
-/// Below this METIS has nothing to gain.
-constexpr Eigen::Index kSmallSystem = 2000;
-/// A boundary vertex that turns by more is a corner of the shape itself.
-constexpr double kShapeCornerTurn = std::numbers::pi / 4;
-constexpr double kLeastSideShare = .005;
 /// Strips are mapped onto at most so many squares in a row.
-constexpr int kMostSquares = 64;
-/// Of more forks than these only the ones nearest to the quarters of the boundary are tried as corners.
-constexpr std::size_t kMostForks = 16;
+constexpr double kMostSquares = 64;
+/// A map that lengthens the curve by more is made again with a sliding boundary.
+constexpr double kGoodLengthening = 1.03;
+/// So many parts that the map shrinks to nothing are slit open, one after the other.
+constexpr int kMostExtensions = 6;
 
-double angle(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-double angle_at(const Disk& disk, std::uint32_t face, std::size_t corner) {
-  const Triangle& f = disk.faces()[face];
-  const Vector3d& p = disk.positions()[f[corner]];
-  return angle(disk.positions()[f[(corner + 1) % 3]] - p, disk.positions()[f[(corner + 2) % 3]] - p);
-}
-
-/// Where along the outer loop the four corners of the square go, as indices of its sides, rising.
-using Corners = std::array<std::size_t, 4>;
-
-/// Length along the loop before each side, and all of it at the end.
-std::vector<double> lengths_along(const CutDisk& cut) {
-  std::vector<double> along{0};
-  for (const TriangleSide s : cut.outer) along.push_back(along.back() + cut.disk.length(s));
-  return along;
-}
-
-std::array<double, 4> side_lengths(const Corners& corners, const std::vector<double>& along) {
-  std::array<double, 4> sides{};
-  for (std::size_t k = 0; k < 3; ++k) sides[k] = along[corners[k + 1]] - along[corners[k]];
-  sides[3] = along.back() - along[corners[3]] + along[corners[0]];
-  return sides;
-}
-
-/// Adds the place nearest to the middle of the longest stretch between two corners.
-void add_middle_of_longest(std::vector<std::size_t>& corners, const std::vector<double>& along) {
-  const std::size_t n = along.size() - 1;
-  const auto at = [&](std::size_t i) { return along[i % n] + (i >= n ? along.back() : 0); };
-  const auto end_of = [&](std::size_t k) { return k + 1 < corners.size() ? corners[k + 1] : corners[0] + n; };
-  std::size_t longest = 0;
-  for (std::size_t k = 1; k < corners.size(); ++k)
-    if (at(end_of(k)) - at(corners[k]) > at(end_of(longest)) - at(corners[longest])) longest = k;
-  const double middle = .5 * (at(corners[longest]) + at(end_of(longest)));
-  std::size_t best = corners[longest] + 1;
-  for (std::size_t i = best; i < end_of(longest); ++i)
-    if (std::abs(at(i) - middle) < std::abs(at(best) - middle)) best = i;
-  corners.push_back(best % n);
-  std::sort(corners.begin(), corners.end());
-}
-
-/// The shape's own corners, sharpest first; a shape with fewer than four gets the others in the middle of its longest
-/// sides.
-std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<double>& along) {
-  std::vector<double> turn(cut.disk.positions().size(), std::numbers::pi);
-  for (std::uint32_t f = 0; f < cut.disk.faces().size(); ++f)
-    for (std::size_t c = 0; c < 3; ++c) turn[cut.disk.faces()[f][c]] -= angle_at(cut.disk, f, c);
-  const auto turn_at = [&](std::size_t i) { return turn[cut.disk.from(cut.outer[i])]; };
-  std::vector<std::size_t> sharp;
-  for (std::size_t i = 0; i < cut.outer.size(); ++i)
-    if (turn_at(i) >= kShapeCornerTurn) sharp.push_back(i);
-  if (sharp.empty()) return std::nullopt;
-  std::stable_sort(sharp.begin(), sharp.end(),
-                   [&](std::size_t a, std::size_t b) { return turn_at(a) > turn_at(b) + 1e-9; });
-  if (sharp.size() > 4) sharp.resize(4);
-  std::sort(sharp.begin(), sharp.end());
-  while (sharp.size() < 4) add_middle_of_longest(sharp, along);
-  const Corners corners{sharp[0], sharp[1], sharp[2], sharp[3]};
-  const auto sides = side_lengths(corners, along);
-  if (*std::min_element(sides.begin(), sides.end()) < kLeastSideShare * along.back()) return std::nullopt;
-  return corners;
-}
-
-Corners corners_by_length(const std::vector<double>& along) {
-  const std::size_t n = along.size() - 1;
-  Corners corners{};
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double wanted = (static_cast<double>(k) + .5) / 4 * along.back();
-    const auto above = static_cast<std::size_t>(std::lower_bound(along.begin(), along.end(), wanted) - along.begin());
-    const std::size_t nearest = above > 0 && wanted - along[above - 1] < along[above] - wanted ? above - 1 : above;
-    corners[k] = std::min(std::max(nearest, k == 0 ? 0 : corners[k - 1] + 1), n - 4 + k);
-  }
-  return corners;
-}
-
-/// Four of the forks so that opposite sides are alike and none is short.
-std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<double>& along) {
-  std::vector<std::size_t> forks;
-  for (std::size_t i = 0; i < cut.outer.size(); ++i)
-    if (std::ranges::find(cut.forks, cut.disk.from(cut.outer[i])) != cut.forks.end()) forks.push_back(i);
-  if (forks.size() < 4 || forks.size() > kMostForks) return std::nullopt;
-  std::optional<Corners> best;
-  double best_score = std::numeric_limits<double>::infinity();
-  const std::size_t n = forks.size();
-  for (std::size_t a = 0; a + 3 < n; ++a)
-    for (std::size_t b = a + 1; b + 2 < n; ++b)
-      for (std::size_t c = b + 1; c + 1 < n; ++c)
-        for (std::size_t d = c + 1; d < n; ++d) {
-          const Corners corners{forks[a], forks[b], forks[c], forks[d]};
-          const auto sides = side_lengths(corners, along);
-          const double shortest = *std::min_element(sides.begin(), sides.end());
-          const double score = std::abs(sides[0] - sides[2]) + std::abs(sides[1] - sides[3]) - .1 * shortest;
-          if (shortest > kLeastSideShare * along.back() && score < best_score) best = corners, best_score = score;
-        }
-  return best;
+bool is_flipped(const Triangle& f, const std::vector<Vector2d>& places) {
+  return orientation(places[f[0]], places[f[1]], places[f[2]]) <= 0;
 }
 
 /// How many squares in a row suit a strip with these sides, the first one running along the row.
@@ -140,51 +30,40 @@ int squares_for(const std::array<double, 4>& sides, double area) {
   const double length = .5 * (sides[0] + sides[2]), width = .5 * (sides[1] + sides[3]);
   // A boundary that is short against the area belongs to a blob, not to a strip.
   if (area > 2 * length * width) return 1;
-  return std::clamp(static_cast<int>(std::lround(length / width)), 1, kMostSquares);
+  return static_cast<int>(std::lround(std::clamp(length / width, 1., kMostSquares)));
+}
+
+double area_of(const Disk& disk, const Triangle& face) {
+  const Vector3d& p = disk.positions()[face[0]];
+  return .5 * (disk.positions()[face[1]] - p).cross(disk.positions()[face[2]] - p).norm();
 }
 
 double area_of(const Disk& disk) {
   double area = 0;
-  for (const Triangle& f : disk.faces()) {
-    const Vector3d& p = disk.positions()[f[0]];
-    area += .5 * (disk.positions()[f[1]] - p).cross(disk.positions()[f[2]] - p).norm();
-  }
+  for (const Triangle& face : disk.faces()) area += area_of(disk, face);
   return area;
 }
 
-/// The boundary's places on the square, and which sides of the square a vertex lies on (bits; corners have two).
+/// Bits: a corner of the square lies on two sides.
+constexpr std::uint8_t kBottom = 1, kRight = 2, kTop = 4, kLeft = 8, kAllSides = 15;
+
+/// The boundary's places on the unit square by length, and which sides of the square a vertex lies on.
 struct SquareBoundary {
-  SquareMap map;
+  std::vector<Vector2d> places;
   std::vector<std::uint8_t> sides;
-  std::vector<char> is_boundary;
+
+  std::vector<char> on_sides(std::uint8_t which) const {
+    std::vector<char> is_on(sides.size());
+    std::ranges::transform(sides, is_on.begin(), [&](std::uint8_t s) { return static_cast<char>((s & which) != 0); });
+    return is_on;
+  }
 };
 
-struct SquareCorners {
-  Corners corners;
-  int square_count = 1;
-};
-
-SquareCorners choose_corners(const CutDisk& cut, const std::vector<double>& along) {
-  const auto natural = cut.is_cut ? corners_at_forks(cut, along) : corners_of_shape(cut, along);
-  if (!natural) return {corners_by_length(along), 1};
-  const Corners& c = *natural;
-  const auto s = side_lengths(c, along);
-  const double area = area_of(cut.disk);
-  if (s[0] + s[2] >= s[1] + s[3]) return {c, squares_for(s, area)};
-  return {{c[1], c[2], c[3], c[0]}, squares_for({s[1], s[2], s[3], s[0]}, area)};
-}
-
-SquareBoundary place_boundary(const CutDisk& cut) {
-  const std::vector<double> along = lengths_along(cut);
-  const auto [corners, square_count] = choose_corners(cut, along);
-  const double width = square_count;
-  const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(width, 0), Vector2d(width, 1), Vector2d(0, 1)};
-
+SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const std::vector<double>& along) {
+  const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(1, 0), Vector2d(1, 1), Vector2d(0, 1)};
   SquareBoundary boundary;
-  boundary.map.square_count = square_count;
-  boundary.map.places.assign(cut.disk.positions().size(), Vector2d(.5 * width, .5));
+  boundary.places.assign(cut.disk.positions().size(), Vector2d(.5, .5));
   boundary.sides.assign(cut.disk.positions().size(), 0);
-  boundary.is_boundary.assign(cut.disk.positions().size(), 0);
   const std::size_t n = cut.outer.size();
   for (std::size_t k = 0; k < 4; ++k) {
     const std::size_t begin = corners[k], end = corners[(k + 1) % 4] + (corners[(k + 1) % 4] <= begin ? n : 0);
@@ -194,9 +73,8 @@ SquareBoundary place_boundary(const CutDisk& cut) {
     for (std::size_t i = begin; i <= end; ++i) {
       const std::uint32_t v = cut.disk.from(cut.outer[i % n]);
       const double f = (at(i) - at(begin)) / (at(end) - at(begin));
-      boundary.map.places[v] = i == end ? to : Vector2d(from + f * (to - from));
+      boundary.places[v] = i == end ? to : Vector2d(from + f * (to - from));
       boundary.sides[v] |= static_cast<std::uint8_t>(1u << k);
-      boundary.is_boundary[v] = 1;
     }
   }
   return boundary;
@@ -212,106 +90,150 @@ void split_chords(Disk& disk, SquareBoundary& boundary) {
       if (disk.neighbours()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
         continue;
       disk.split_edge(side);
-      boundary.map.places.emplace_back(.5, .5);
+      boundary.places.emplace_back(.5, .5);
       boundary.sides.push_back(0);
-      boundary.is_boundary.push_back(0);
     }
 }
 
-/// Weight of the arc from a vertex to the next corner of a face, the half that this face gives.
-using HalfWeight = double (*)(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to);
-
-double cotan_half(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to) {
-  const std::size_t apex = 3 - from - to;
-  const double tangent = std::tan(angle_at(disk, face, apex));
-  const double cotan = std::abs(tangent) < 1e-9 ? std::copysign(1e9, tangent) : 1 / tangent;
-  return std::clamp(cotan, kLeastWeight, kMostWeight);
+/// Squared stretches of the map of a face, from the surface to the square, larger one first.
+std::array<double, 2> squared_stretches(const Disk& disk, const Triangle& face, const std::vector<Vector2d>& places) {
+  const Vector3d p = disk.positions()[face[1]] - disk.positions()[face[0]];
+  const Vector3d q = disk.positions()[face[2]] - disk.positions()[face[0]];
+  const double height = p.cross(q).norm() / p.norm();
+  // In axes of its plane, the first along p.
+  const Vector2d dx = (places[face[1]] - places[face[0]]) / p.norm();
+  const Vector2d dy = (places[face[2]] - places[face[0]] - dx * (p.dot(q) / p.norm())) / height;
+  const double mean = .5 * (dx.squaredNorm() + dy.squaredNorm());
+  const double spread = std::hypot(.5 * (dx.squaredNorm() - dy.squaredNorm()), dx.dot(dy));
+  return {mean + spread, std::max(0., mean - spread)};
 }
 
-double mean_value_half(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to) {
-  const Triangle& f = disk.faces()[face];
-  const double length = (disk.positions()[f[to]] - disk.positions()[f[from]]).norm();
-  const double weight = length > 0 ? std::tan(angle_at(disk, face, from) / 2) / length : 0;
-  return std::max(weight, 1e-12);
-}
-
-/// The linear system for the inner vertices: every one is the weighted mean of its neighbours.
-struct MapSystem {
-  Sparse matrix;
-  Eigen::MatrixX2d right;
-  std::vector<std::uint32_t> inner;  ///< the vertices
+struct Shear {
+  double ratio = 1, lengthening = 1;
 };
 
-MapSystem assemble(const Disk& disk, const SquareBoundary& boundary, HalfWeight half) {
-  MapSystem system;
-  std::vector<int> index(boundary.map.places.size(), -1);
-  for (std::uint32_t v = 0; v < index.size(); ++v)
-    if (!boundary.is_boundary[v]) {
-      index[v] = static_cast<int>(system.inner.size());
-      system.inner.push_back(v);
+/// Means weighted by the area of the surface; no face counts for more than kMost.
+Shear mean_shear(const Disk& disk, const std::vector<Vector2d>& places) {
+  constexpr double kMost = 1e3;
+  Shear sum{0, 0};
+  double area = 0;
+  for (std::size_t f = 0; f < disk.faces().size(); ++f) {
+    if (disk.sources()[f].triangle == kNoTriangle) continue;
+    const Triangle& face = disk.faces()[f];
+    const double face_area = area_of(disk, face);
+    if (!(face_area > 0)) continue;
+    const auto [large, small] = squared_stretches(disk, face, places);
+    const double ratio = small * kMost * kMost > large ? std::sqrt(large / small) : kMost;
+    sum.ratio += face_area * ratio;
+    sum.lengthening += face_area * .5 * (std::sqrt(ratio) + 1 / std::sqrt(ratio));
+    area += face_area;
+  }
+  return area > 0 ? Shear{sum.ratio / area, sum.lengthening / area} : Shear{};
+}
+
+double energy(const WeightedGraph& graph, const Eigen::VectorXd& values) {
+  double sum = 0;
+  for (std::uint32_t v = 0; v < graph.vertex_count(); ++v)
+    for (auto a = graph.begin[v]; a < graph.begin[v + 1]; ++a)
+      sum += .5 * graph.weight[a] * std::pow(values[v] - values[graph.to[a]], 2);
+  return sum;
+}
+
+/// Rows of (x, y) on the unit square, stretched to a row of squares, and turned by a right angle if it stands upright.
+std::vector<Vector2d> places_of(const Eigen::MatrixXd& values, double width, bool is_upright) {
+  std::vector<Vector2d> places(static_cast<std::size_t>(values.rows()));
+  for (Eigen::Index v = 0; v < values.rows(); ++v)
+    places[static_cast<std::size_t>(v)] =
+        is_upright ? Vector2d(width * values(v, 1), 1 - values(v, 0)) : Vector2d(width * values(v, 0), values(v, 1));
+  return places;
+}
+
+/// The maps that can be made of one cut, and the best of those that are valid.
+struct MapTrial {
+  std::optional<SquareMap> best;
+  std::vector<std::uint32_t> flipped;  ///< vertices of the flipped faces of the last map that had any
+
+  explicit MapTrial(CutDisk& c)
+      : cut(c),
+        along(lengths_along(cut)),
+        corners(choose_corners(cut, along)),
+        boundary(place_boundary(cut, corners, along)) {
+    split_chords(cut.disk, boundary);
+    graph = cotan_graph(cut.disk);
+    order = elimination_order(graph);
+    boundary_places.resize(static_cast<Eigen::Index>(boundary.places.size()), 2);
+    for (std::size_t v = 0; v < boundary.places.size(); ++v)
+      boundary_places.row(static_cast<Eigen::Index>(v)) = boundary.places[v];
+    const bool has_corners = !cut.is_cut || cut.forks.size() >= 4;
+    square_count = has_corners ? squares_for(side_lengths(corners, along), area_of(cut.disk)) : 1;
+  }
+
+  void fix_boundary() {
+    Eigen::MatrixXd values = boundary_places;
+    if (solve_symmetric(graph, order, boundary.on_sides(kAllSides), values))
+      take(places_of(values, square_count, false), square_count);
+  }
+
+  void slide_boundary() {
+    Eigen::MatrixXd values = boundary_places;
+    if (!solve_symmetric(graph, order, boundary.on_sides(kLeft | kRight), values.col(0)) ||
+        !solve_symmetric(graph, order, boundary.on_sides(kBottom | kTop), values.col(1)))
+      return;
+    const double width = std::sqrt(energy(graph, values.col(1)) / energy(graph, values.col(0)));
+    const int count = static_cast<int>(std::lround(std::clamp(std::max(width, 1 / width), 1., kMostSquares)));
+    take(places_of(values, count, width < 1), count);
+  }
+
+  void use_mean_values() {
+    Eigen::MatrixXd values = boundary_places;
+    if (solve_general(mean_value_graph(cut.disk), boundary.on_sides(kAllSides), values))
+      take(places_of(values, square_count, false), square_count);
+  }
+
+ private:
+  void take(std::vector<Vector2d> places, int count) {
+    if (count_flipped(cut.disk, places) > 0) {
+      flipped.clear();
+      for (const Triangle& face : cut.disk.faces())
+        if (is_flipped(face, places)) flipped.insert(flipped.end(), face.begin(), face.end());
+      return;
     }
-  const auto n = static_cast<Eigen::Index>(system.inner.size());
-  system.right = Eigen::MatrixX2d::Zero(n, 2);
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(12 * disk.faces().size());
-  const auto add = [&](std::uint32_t v, std::uint32_t w, double weight) {
-    if (index[v] < 0) return;
-    entries.emplace_back(index[v], index[v], weight);
-    if (index[w] >= 0)
-      entries.emplace_back(index[v], index[w], -weight);
-    else
-      system.right.row(index[v]) += weight * boundary.map.places[w].transpose();
-  };
-  for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
-    for (std::size_t c = 0; c < 3; ++c) {
-      const std::size_t d = (c + 1) % 3;
-      add(disk.faces()[f][c], disk.faces()[f][d], half(disk, f, c, d));
-      add(disk.faces()[f][d], disk.faces()[f][c], half(disk, f, d, c));
-    }
-  system.matrix.resize(n, n);
-  system.matrix.setFromTriplets(entries.begin(), entries.end());
-  return system;
-}
+    const Shear shear = mean_shear(cut.disk, places);
+    if (!best || shear.lengthening < best->lengthening)
+      best = SquareMap{std::move(places), count, shear.ratio, shear.lengthening};
+  }
 
-template <class Solver>
-bool solve_with(Solver&& solver, const MapSystem& system, std::vector<Vector2d>& map) {
-  solver.compute(system.matrix);
-  if (solver.info() != Eigen::Success) return false;
-  const Eigen::MatrixX2d places = solver.solve(system.right);
-  if (!places.allFinite()) return false;
-  for (std::size_t i = 0; i < system.inner.size(); ++i) map[system.inner[i]] = places.row(static_cast<Eigen::Index>(i));
-  return true;
-}
-
-bool solve_symmetric(const MapSystem& system, std::vector<Vector2d>& map) {
-  if (system.matrix.rows() == 0) return true;
-  if (system.matrix.rows() < kSmallSystem)
-    return solve_with(Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>>(), system, map);
-  return solve_with(Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::MetisOrdering<int>>(), system, map);
-}
-
-bool solve_general(const MapSystem& system, std::vector<Vector2d>& map) {
-  if (system.matrix.rows() == 0) return true;
-  return solve_with(Eigen::SparseLU<Sparse, Eigen::COLAMDOrdering<int>>(), system, map);
-}
+  CutDisk& cut;
+  std::vector<double> along;
+  Corners corners;
+  SquareBoundary boundary;
+  WeightedGraph graph;
+  std::vector<std::uint32_t> order;
+  Eigen::MatrixXd boundary_places;  ///< a row a vertex
+  int square_count = 1;             ///< with the boundary fixed
+};
 
 }  // namespace
 
 std::size_t count_flipped(const Disk& disk, const std::vector<Vector2d>& places) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      disk.faces(), [&](const Triangle& f) { return orientation(places[f[0]], places[f[1]], places[f[2]]) <= 0; }));
+  return static_cast<std::size_t>(
+      std::ranges::count_if(disk.faces(), [&](const Triangle& face) { return is_flipped(face, places); }));
 }
 
 std::optional<SquareMap> map_to_square(CutDisk& cut) {
-  if (cut.outer.size() < 4) return std::nullopt;
-  SquareBoundary boundary = place_boundary(cut);
-  split_chords(cut.disk, boundary);
-  SquareMap map = boundary.map;
-  const auto is_valid = [&] { return count_flipped(cut.disk, map.places) == 0; };
-  if (solve_symmetric(assemble(cut.disk, boundary, cotan_half), map.places) && is_valid()) return map;
-  map.places = boundary.map.places;
-  if (solve_general(assemble(cut.disk, boundary, mean_value_half), map.places) && is_valid()) return map;
-  return std::nullopt;
+  for (int extensions = 0;; ++extensions) {
+    if (cut.outer.size() < 4) return std::nullopt;
+    MapTrial trial(cut);
+    trial.fix_boundary();
+    if (trial.best && trial.best->lengthening <= kGoodLengthening) return trial.best;
+    trial.slide_boundary();
+    if (trial.best) return trial.best;
+    // Where places differ in their last digits only, the map has shrunk a part to nothing.
+    if (extensions == kMostExtensions || !extend_cut(cut, trial.flipped)) {
+      trial.use_mean_values();
+      return trial.best;
+    }
+  }
 }
 
 }  // namespace hilbrush
