@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kCellBytesMax = 1u << 20;
-constexpr std::size_t kToneCurvesMax = 32;
+constexpr std::size_t kToneCurvesMax = 256;
 constexpr std::size_t kTonePointsMax = 1001;
 
 AxisDescription read_axis(JsonObject& json, AxisIndex axis) {
@@ -89,6 +89,9 @@ void read_laser(JsonObject& json, CellDescription::Laser& laser) {
 ToneCurveEntry read_tone_curve(JsonObject& json, double asked_max) {
   ToneCurveEntry entry;
   entry.sampler = json.text("sampler", 40);
+  entry.curve = json.optional_text("curve", 40).value_or(entry.curve);
+  entry.levels = static_cast<int>(json.optional_integer("levels", 1, 4).value_or(1));
+  entry.spot_pitches = json.optional_number("spot_pitches", {0.2, 100});
   entry.wanted = json.numbers("wanted", 2, kTonePointsMax, {0, 1});
   entry.asked = json.numbers("asked", entry.wanted.size(), entry.wanted.size(), {0, asked_max});
   if (entry.wanted.front() != 0 || entry.wanted.back() != 1) json.refuse("wanted", "does not go from 0 to 1");
@@ -110,7 +113,9 @@ void read_paint(JsonObject& json, CellDescription::Paint& paint) {
   json.objects("tone_curves", kToneCurvesMax, [&](JsonObject& curve) {
     ToneCurveEntry entry = read_tone_curve(curve, paint.asked_max);
     for (const ToneCurveEntry& other : paint.tone_curves)
-      if (other.sampler == entry.sampler) curve.refuse("sampler", "\"" + entry.sampler + "\" has a curve already");
+      if (other.sampler == entry.sampler && other.curve == entry.curve && other.levels == entry.levels &&
+          other.spot_pitches == entry.spot_pitches)
+        curve.refuse("sampler", "\"" + entry.sampler + "\" has a curve already");
     paint.tone_curves.push_back(std::move(entry));
   });
 }
@@ -227,15 +232,66 @@ fs::path find_cell(const std::string& name) {
   return file;
 }
 
-ToneOptions tone_options(const CellDescription& cell, const std::string& sampler, bool* is_calibrated) {
+namespace {
+
+/// Of the curves for this placement the one with the nearest spot; null if there is none.
+const ToneCurveEntry* find_tone_curve(const CellDescription::Paint& paint, const ToneCurveUse& use) {
+  const ToneCurveEntry* best = nullptr;
+  double best_off = 0;
+  for (const ToneCurveEntry& entry : paint.tone_curves) {
+    if (entry.sampler != use.sampler || entry.curve != use.curve || entry.levels != use.levels) continue;
+    const double off = entry.spot_pitches && use.spot_pitches ? std::abs(*entry.spot_pitches - *use.spot_pitches) : 0;
+    if (best == nullptr || off < best_off) best = &entry, best_off = off;
+  }
+  return best;
+}
+
+std::string describe(const ToneCurveUse& use) {
+  std::string text = "sampler \"" + use.sampler + "\"";
+  if (use.curve != "hilbert") text += " on curve \"" + use.curve + "\"";
+  if (use.levels != 1) text += " with " + std::to_string(use.levels) + " levels";
+  return text;
+}
+
+constexpr double kSpotTolerance = .1;
+
+}  // namespace
+
+ToneOptions tone_options(const CellDescription& cell, const ToneCurveUse& use, std::string& warning) {
   ToneOptions options;
   options.reflectance_white = cell.paint.reflectance_white;
   options.reflectance_black = cell.paint.reflectance_black;
-  const auto& curves = cell.paint.tone_curves;
-  const auto found =
-      std::find_if(curves.begin(), curves.end(), [&](const ToneCurveEntry& e) { return e.sampler == sampler; });
-  if (is_calibrated != nullptr) *is_calibrated = found != curves.end();
-  if (found != curves.end()) options.curve = {found->wanted, found->asked};
+  warning.clear();
+  const ToneCurveEntry* found = find_tone_curve(cell.paint, use);
+  if (found == nullptr) {
+    const std::string none = "the cell file has no tone curve for " + describe(use);
+    if (use.curve != "laminar") {
+      ToneCurveUse other = use;
+      for (const char* curve : {"hilbert", "peano2"}) {
+        other.curve = curve;
+        if (found == nullptr) found = find_tone_curve(cell.paint, other);
+      }
+    }
+    warning = none + (found == nullptr ? ": tones will be off" : ", that on curve \"" + found->curve + "\" is used") +
+              "; `hilbrush calibrate` makes one";
+  }
+  if (found == nullptr) return options;
+  options.curve = {found->wanted, found->asked};
+  if (found->spot_pitches && use.spot_pitches &&
+      std::abs(*found->spot_pitches / *use.spot_pitches - 1) > kSpotTolerance && warning.empty()) {
+    std::ostringstream text;
+    text << "the tone curve for " << describe(use) << " was made for a spot of " << *found->spot_pitches
+         << " pitches, and at this pitch it has " << *use.spot_pitches
+         << ": tones will be off; `hilbrush calibrate --dpi` makes one";
+    warning = text.str();
+  }
+  return options;
+}
+
+ToneOptions tone_options(const CellDescription& cell, const std::string& sampler, bool* is_calibrated) {
+  std::string warning;
+  ToneOptions options = tone_options(cell, {.sampler = sampler}, warning);
+  if (is_calibrated != nullptr) *is_calibrated = warning.empty();
   return options;
 }
 

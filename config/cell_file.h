@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,18 @@ std::filesystem::path find_cell(const std::string& name);
 
 /// The names of the cells in the cells folder, sorted.
 std::vector<std::string> known_cells();
+
+/// What a tone curve is good for: how dots are placed, and the size of the spot at the job's pitch.
+struct ToneCurveUse {
+  std::string sampler, curve = "hilbert";
+  int levels = 1;
+  std::optional<double> spot_pitches = {};
+};
+
+/// Paint and tone curve for that use. Of several spots the nearest one's curve is taken. If the file has none for the
+/// use, that of the same sampler and levels on the other space-filling curve, else none at all; `warning` says
+/// so, and if the spot is another by more than a tenth. It is left empty if all is well.
+ToneOptions tone_options(const CellDescription& cell, const ToneCurveUse& use, std::string& warning);
 
 /// The tone options that painting on this cell needs with this sampler; identity curve (and false in *is_calibrated) if
 /// the file has none.

@@ -28,8 +28,8 @@ struct JobSettings {
   CurveKind curve = CurveKind::kHilbert;
   DensitySource density = DensitySource::kTexture;
   std::uint64_t seed = 1;
-  int levels = 1;             ///< energies that a dot may have, 1 to 4
-  int predictive_rounds = 0;  ///< of the loop that predicts the picture and asks again, 0 to 4
+  int levels = 1;                             ///< energies that a dot may have, 1 to 4
+  int predictive_rounds = 0;                  ///< of the loop that predicts the picture and asks again, 0 to 4
   std::optional<double> largest_gap_pitches;  ///< holes wider than this are filled with dots
   int fine_passes = 24;                       ///< over all dots, of the sampler "fine"
   ToneMapping tone_curve = ToneMapping::kCalibrated;

@@ -14,6 +14,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/executor.h"
+#include "daemon/job_sampling.h"
 #include "daemon/painted_dots.h"
 #include "daemon/report.h"
 #include "planner/plan.h"
@@ -31,6 +32,7 @@
 #include "sim/film/calibrate.h"
 #include "sim/film/fidelity.h"
 #include "sim/film/film.h"
+#include "sim/film/picture_means.h"
 #include "sim/film/views.h"
 
 namespace hilbrush {
@@ -119,14 +121,10 @@ struct Workpiece {
     report.mesh.faces = mesh.triangle_count();
     report.mesh.area_m2 = mesh.area_m2();
 
-    bool is_calibrated = false;
-    tone_options = hilbrush::tone_options(cell, sampler_name(settings.sampler), &is_calibrated);
-    tone_options.untextured = settings.untextured;
-    if (!is_calibrated)
-      report.mesh.warnings.push_back("the cell file has no tone curve for sampler \"" +
-                                     std::string(sampler_name(settings.sampler)) +
-                                     "\": tones will be off; `hilbrush calibrate` makes one");
-    for (const auto& warning : report.mesh.warnings) stages.warn(warning);
+    std::string warning;
+    tone_options = job_tone_options(cell, settings, mesh, warning);
+    if (!warning.empty()) report.mesh.warnings.push_back(warning);
+    for (const auto& sentence : report.mesh.warnings) stages.warn(sentence);
     tone.emplace(mesh, tone_options);
   }
 
@@ -172,7 +170,8 @@ DotSequence sample_dots(Workpiece& piece, Stages& stages) {
       "curve", [&](const Progress& progress) { return std::make_unique<SurfaceCurve>(piece.mesh, progress); });
   piece.report.mesh.components = curve->components();
   auto dots = stages.run("dots", [&](const Progress& progress) {
-    return place_dots(*curve, *piece.tone, sample_options(piece.settings), &piece.report.path, progress);
+    return place_picture(*curve, *piece.tone, piece.tone_options, picture_options(piece.cell, piece.settings),
+                         film_predictor(piece.cell, *piece.tone), &piece.report.picture, progress);
   });
   if (dots.dots.empty()) {
     piece.report.mesh.warnings.emplace_back(

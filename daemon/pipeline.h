@@ -47,9 +47,13 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
 std::vector<Joints> run_approach(const PipelineRequest& request, const std::filesystem::path& program, std::size_t next,
                                  const Joints& from);
 
-/// Paints grey wedges on the cell's simulated film; writes tone_curve.json (an entry for paint.tone_curves of the cell
-/// file) and returns its text.
-std::string run_calibrate(const PipelineRequest& request, const PipelineListener& listener);
+/// Paints grey wedges on the cell's simulated film, or takes the readings of a real one from `measured` (wedge.h;
+/// empty: none); writes tone_curve.json (an entry for paint.tone_curves of the cell file) and returns its text.
+std::string run_calibrate(const PipelineRequest& request, const std::filesystem::path& measured,
+                          const PipelineListener& listener);
+
+/// Writes what painting and measuring a real wedge needs (wedge.h): wedge.wrl, wedge.json, wedge_steps.json.
+std::string run_wedge(const PipelineRequest& request);
 
 /// Every file that reading the model reads: the model, inlines, material files, images.
 std::vector<std::filesystem::path> run_files(const std::filesystem::path& model);

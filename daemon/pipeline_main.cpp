@@ -43,7 +43,8 @@ class ProgressLines {
 };
 
 struct Arguments {
-  std::string model, settings_json = "{}", cell, output, program, emissions;
+  std::string model, settings_json = "{}", cell, output, program, emissions, measured;
+  bool wedge = false;
   std::vector<double> from;
   std::size_t next = 0;
 };
@@ -67,7 +68,8 @@ Json run(const std::string& command, const Arguments& arguments, const PipelineL
   if (command == "plan") return Json::parse(run_plan(request, listener));
   if (command == "dry-run") return Json::parse(run_dry_run(request, listener));
   if (command == "develop") return Json::parse(run_develop(request, arguments.program, arguments.emissions, listener));
-  if (command == "calibrate") return Json::parse(run_calibrate(request, listener));
+  if (command == "calibrate" && arguments.wedge) return Json::parse(run_wedge(request));
+  if (command == "calibrate") return Json::parse(run_calibrate(request, arguments.measured, listener));
 
   Joints from{};
   std::copy(arguments.from.begin(), arguments.from.end(), from.begin());
@@ -126,7 +128,9 @@ int main(int argc, char** argv) {
   CLI::App* develop = add("develop", "develop what a simulated cell recorded", true, true);
   develop->add_option("--program", arguments.program, "program file")->required();
   develop->add_option("--emissions", arguments.emissions, "the cell's record of emissions")->required();
-  add("calibrate", "make a tone curve from a wedge on the simulated film", false, true);
+  CLI::App* calibrate = add("calibrate", "make a tone curve from a grey wedge", false, true);
+  auto* measured = calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
+  calibrate->add_flag("--wedge", arguments.wedge, "write a wedge to paint and measure")->excludes(measured);
   CLI::App* approach = add("approach", "plan the way from measured joints to an exposure", true, false);
   approach->add_option("--program", arguments.program, "program file")->required();
   approach->add_option("--next", arguments.next, "index of the exposure to reach")->required();

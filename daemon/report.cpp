@@ -69,6 +69,12 @@ Json dots_json(const DotCounts& dots) {
           {"in_doubt", dots.in_doubt},   {"remaining", dots.remaining}, {"skipped", dots.skipped}};
 }
 
+Json predictive_json(const PredictiveReport& predictive) {
+  Json errors = Json::array();
+  for (const double error : predictive.error_rms) errors.push_back(figure(error));
+  return {{"rounds", predictive.error_rms.size()}, {"error_rms", errors}};
+}
+
 Json fidelity_json(const FidelityFigures& figures) {
   return {
       {"f1_db", figure(figures.f1_db)},       {"f2_db", figure(figures.f2_db)},       {"s2", figure(figures.s2)},
@@ -108,9 +114,12 @@ std::string report_to_json(const Report& report) {
                     {"expose", figure(report.time.expose_s)},
                     {"retract", figure(report.time.retract_s)},
                     {"total", figure(report.time.total_s())}};
-  json["path"] = {{"length_mm", figure(report.path.path_length_m * 1e3)},
-                  {"constant", figure(report.path.path_constant)},
-                  {"patches", report.path.patch_count}};
+  const SampleReport& path = report.picture.path;
+  json["path"] = {{"length_mm", figure(path.path_length_m * 1e3)},
+                  {"constant", figure(path.path_constant)},
+                  {"patches", path.patch_count}};
+  json["levels"] = report.picture.dots_of_level;
+  json["predictive"] = predictive_json(report.picture.predictive);
   if (report.fidelity) {
     json["fidelity"] = fidelity_json(report.fidelity->reachable);
     json["fidelity"]["unreachable_share"] = figure(report.fidelity->unreachable_share);

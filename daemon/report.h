@@ -8,7 +8,7 @@
 
 #include "planner/plan.h"
 #include "sampling/mesh_repair.h"
-#include "sampling/sample.h"
+#include "sampling/place_picture.h"
 #include "sim/film/fidelity.h"
 
 /// What one run of the pipeline found, as people and programs read it: report.json. Keys are stable: added, never
@@ -47,7 +47,7 @@ struct Report {
   double pitch_m = 0;
   IncidenceFigures incidence;
   TimeSplit time;
-  SampleReport path;
+  PictureReport picture;
   std::optional<Fidelity> fidelity;
   std::optional<HitFigures> hits;
   std::vector<std::pair<std::string, double>> stages_s;

@@ -39,7 +39,9 @@ enum class PaintResponse {
 
 /// A calibrated tone curve and what it was made for.
 struct ToneCurveEntry {
-  std::string sampler;  ///< the placement's name, as in a job's settings
+  std::string sampler, curve = "hilbert";  ///< the placement's names, as in a job's settings
+  int levels = 1;                          ///< energies of the dots
+  std::optional<double> spot_pitches;      ///< the spot's 1/e2 diameter, if it matters to say
   std::vector<double> wanted, asked;
 };
 

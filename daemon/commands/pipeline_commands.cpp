@@ -26,7 +26,8 @@ constexpr std::array kStages{"load", "disk", "curve", "dots", "plan", "check", "
 constexpr std::size_t kReportBytesMax = 64u << 20;
 
 struct PipelineFlags {
-  std::string command, model, output, program, emissions;
+  std::string command, model, output, program, emissions, measured;
+  bool is_wedge = false;
   SettingsFlags settings;
 };
 
@@ -69,6 +70,8 @@ std::vector<std::string> child_arguments(const PipelineFlags& flags, const JobSe
   add("--output", fs::absolute(flags.output).lexically_normal().string());
   if (!flags.program.empty()) add("--program", existing_file(flags.program, "program"));
   if (!flags.emissions.empty()) add("--emissions", existing_file(flags.emissions, "record of emissions"));
+  if (!flags.measured.empty()) add("--measured", existing_file(flags.measured, "readings of a wedge"));
+  if (flags.is_wedge) arguments.emplace_back("--wedge");
   return arguments;
 }
 
@@ -76,9 +79,10 @@ void print_files(std::ostream& out, const fs::path& output) {
   struct Line {
     const char *label, *file;
   };
-  constexpr std::array kLines{Line{"report", "report.json"}, Line{"pictures", "exposure.png"},
-                              Line{"views", "views"},        Line{"program", "program.ply"},
-                              Line{"dots", "dots.ply"},      Line{"tone curve", "tone_curve.json"}};
+  constexpr std::array kLines{
+      Line{"report", "report.json"},  Line{"pictures", "exposure.png"},   Line{"views", "views"},
+      Line{"program", "program.ply"}, Line{"dots", "dots.ply"},           Line{"tone curve", "tone_curve.json"},
+      Line{"wedge", "wedge.wrl"},     Line{"its settings", "wedge.json"}, Line{"its readings", "wedge_steps.json"}};
   std::error_code error;
   for (const Line& line : kLines) {
     if (!fs::exists(output / line.file, error)) continue;
@@ -111,7 +115,8 @@ int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
     return kExitOk;
   }
   const Json json = Json::parse(result);
-  context.terminal.out << (flags.command == "calibrate" ? format_tone_curve(json) : format_report(json));
+  if (!flags.is_wedge)
+    context.terminal.out << (flags.command == "calibrate" ? format_tone_curve(json) : format_report(json));
   print_files(context.terminal.out, flags.output);
   return kExitOk;
 }
@@ -151,8 +156,14 @@ void add_pipeline_commands(CLI::App& app, CommandContext& context) {
       ->required();
   develop.app->add_option("--emissions", develop.flags->emissions, "the record of what the laser did")->required();
 
-  const Declared calibrate =
-      declare(app, context, "calibrate", "paint a grey wedge on the simulated cell and make a tone curve of it");
+  const Declared calibrate = declare(
+      app, context, "calibrate", "make a tone curve from a grey wedge: on the simulated cell, or painted and measured");
+  auto* measured = calibrate.app->add_option("--measured", calibrate.flags->measured,
+                                             "the wedge_steps.json of a painted wedge, with its readings filled in");
+  calibrate.app
+      ->add_flag("--wedge", calibrate.flags->is_wedge,
+                 "write a wedge to paint instead: wedge.wrl, its job's wedge.json, and wedge_steps.json to fill in")
+      ->excludes(measured);
   calibrate.flags->settings.add_paint_flags_to(*calibrate.app);
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "sampling/input_error.h"
-#include "sampling/sample.h"
 #include "sampling/tone_field.h"
 #include "sim/film/film.h"
 #include "sim/film/picture_means.h"
@@ -45,15 +44,16 @@ double read_field(const Film& film, double width_m, double height_m) {
   return sum / static_cast<double>(count);
 }
 
-double paint_step(const CellDescription& cell, double pitch_m, SampleOptions options, const TexturedMesh& field,
+double paint_step(const CellDescription& cell, double pitch_m, PictureOptions options, const TexturedMesh& field,
                   const SurfaceCurve& curve, double asked) {
   ToneOptions tone_options;
   tone_options.untextured = Untextured::kMaterial;
   tone_options.curve = {{0, 1}, {0, asked}};
   const ToneField tone(field, tone_options);
-  options.pitch_m = pitch_m;
-  options.dot_count.reset();
-  const DotSequence dots = place_dots(curve, tone, options);
+  options.sample.pitch_m = pitch_m;
+  options.sample.dot_count.reset();
+  options.predictive_rounds = 0;
+  const DotSequence dots = place_picture(curve, tone, tone_options, options, {});
   Film film(field, cell, pitch_m);
   expose_dots(film, dots);
   return read_field(film, kFieldWidth * pitch_m, kFieldHeight * pitch_m);
@@ -97,7 +97,7 @@ double asked_for(const std::vector<WedgeStep>& steps, double wanted, double aske
 
 }  // namespace
 
-Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOptions& options) {
+Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOptions& options) {
   return [&cell, pitch_m, options](const std::vector<double>& asked) {
     const TexturedMesh field = black_field(kFieldWidth * pitch_m, kFieldHeight * pitch_m);
     const SurfaceCurve curve(field);
@@ -106,6 +106,23 @@ Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOpt
       steps.push_back({coverage, coverage > 0 ? paint_step(cell, pitch_m, options, field, curve, coverage) : 0.});
     return steps;
   };
+}
+
+ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max) {
+  constexpr std::size_t kStepsMin = 5;
+  if (steps.size() < kStepsMin)
+    throw InputError("", "the wedge has " + std::to_string(steps.size()) + " steps; a curve needs at least " +
+                             std::to_string(kStepsMin));
+  steps.push_back({0, 0});
+  steps = monotone(std::move(steps));
+  if (!(steps.back().painted > 0)) throw InputError("", "the wedge reads no paint at all, whatever was asked");
+  ToneCurve curve;
+  constexpr int kTones = 40;  // fine enough that the bends of the wedge's own steps are kept
+  for (int i = 0; i <= kTones; ++i) {
+    curve.wanted.push_back(static_cast<double>(i) / kTones);
+    curve.asked.push_back(i == 0 ? 0 : asked_for(steps, curve.wanted.back(), asked_max));
+  }
+  return curve;
 }
 
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max) {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "planner/cell_description.h"
-#include "sampling/sample_options.h"
+#include "sampling/place_picture.h"
 #include "sampling/tone.h"
 
 /// From a grey wedge to a tone curve (README, "Tone"). The wedge is a flat strip of 11 or more steps; each is painted
@@ -19,14 +19,18 @@ struct WedgeStep {
 using Wedge = std::function<std::vector<WedgeStep>(const std::vector<double>& asked)>;
 
 /// The wedge of the simulated film: each step is a field of flat surface on which `options` place dots at this pitch
-/// (whose own pitch and count are ignored), exposed at normal incidence and read without its border. Keeps a reference
-/// to `cell`.
-Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const SampleOptions& options);
+/// (whose own pitch, count and predictive rounds are ignored), exposed at normal incidence and read without its border.
+/// Keeps a reference to `cell`.
+Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOptions& options);
 
 /// Inverts the wedge's response: for the wanted tones 0, .1 .. .9, 1 and, where the paint's response bends most, .05,
 /// .75, .85, .95 and .98 the coverage to ask for, at most asked_max. Paints up to six wedges, each asking for what the
 /// ones before suggest, until every step that can be reached reads within .003 of what is wanted.
 /// @throws InputError if the wedge has too few readings or shows no paint at all.
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max);
+
+/// The same from one wedge that was painted and measured once: linear between its steps.
+/// @throws InputError if it has fewer than five steps, or shows no paint at all.
+ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max);
 
 }  // namespace hilbrush

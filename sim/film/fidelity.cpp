@@ -235,7 +235,7 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
                       [&](const tbb::blocked_range<std::size_t>& range) {
                         std::vector<FilmPoint> points;
                         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                          read_means(film, tone, readings[i].point, kSigmas, readings[i].means, points);
+                          read_means(film, &tone, readings[i].point, kSigmas, readings[i].means, points);
                           readings[i].is_reachable = !is_reachable || is_reachable(readings[i].point);
                         }
                       });

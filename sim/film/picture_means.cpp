@@ -15,7 +15,7 @@ namespace {
 constexpr double kCutSigmas = 3;
 constexpr std::array<double, 1> kPredictionSigmas{1};
 
-std::vector<float> means_at(const Film& film, const ToneField& tone, std::span<const SurfacePoint> places,
+std::vector<float> means_at(const Film& film, const ToneField* tone, std::span<const SurfacePoint> places,
                             double PictureMeans::*which) {
   std::vector<float> values(places.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 256),
@@ -32,7 +32,7 @@ std::vector<float> means_at(const Film& film, const ToneField& tone, std::span<c
 
 }  // namespace
 
-void read_means(const Film& film, const ToneField& tone, const SurfacePoint& center, std::span<const double> sigmas,
+void read_means(const Film& film, const ToneField* tone, const SurfacePoint& center, std::span<const double> sigmas,
                 std::span<PictureMeans> means, std::vector<FilmPoint>& points) {
   CHECK_EQ(sigmas.size(), means.size());
   CHECK_LE(sigmas.size(), std::size_t{4});
@@ -43,7 +43,7 @@ void read_means(const Film& film, const ToneField& tone, const SurfacePoint& cen
   for (const FilmPoint& point : points) {
     const Eigen::Vector3d offset = (point.position_O - center_O) / film.pitch_m();
     const double depth = offset.dot(normal_O), r2 = offset.squaredNorm() - depth * depth;
-    const double wanted = tone.wanted(point.point), painted = film.painted(point.dose_j_m2);
+    const double wanted = tone ? tone->wanted(point.point) : 0, painted = film.painted(point.dose_j_m2);
     for (std::size_t k = 0; k < sigmas.size(); ++k) {
       const double reach = kCutSigmas * sigmas[k];
       if (r2 > reach * reach || std::abs(depth) > reach) continue;
@@ -55,7 +55,7 @@ void read_means(const Film& film, const ToneField& tone, const SurfacePoint& cen
     if (weights[k] > 0)
       means[k] = {means[k].wanted / weights[k], means[k].painted / weights[k]};
     else
-      means[k] = {tone.wanted(center), film.painted(center)};
+      means[k] = {tone ? tone->wanted(center) : 0, film.painted(center)};
   }
 }
 
@@ -73,12 +73,12 @@ void expose_dots(Film& film, const DotSequence& dots) {
 PicturePredictor film_predictor(const CellDescription& cell, const ToneField& tone) {
   PicturePredictor predictor;
   predictor.wanted = [&cell, &tone](double pitch_m, std::span<const SurfacePoint> places) {
-    return means_at(Film(tone.mesh(), cell, pitch_m), tone, places, &PictureMeans::wanted);
+    return means_at(Film(tone.mesh(), cell, pitch_m), &tone, places, &PictureMeans::wanted);
   };
   predictor.painted = [&cell, &tone](const DotSequence& dots, std::span<const SurfacePoint> places) {
     Film film(tone.mesh(), cell, dots.pitch_m);
     expose_dots(film, dots);
-    return means_at(film, tone, places, &PictureMeans::painted);
+    return means_at(film, nullptr, places, &PictureMeans::painted);
   };
   return predictor;
 }

@@ -15,8 +15,9 @@ struct PictureMeans {
 
 /// Area-weighted Gaussian means around `center`, sigma `sigmas[k]` pitches in the tangent plane, cut at 3 sigma, only
 /// of film that faces the point and lies within 3 sigma of depth. `points` is room for the film's nodes. A piece of
-/// surface too small to own a node within reach: the point itself.
-void read_means(const Film& film, const ToneField& tone, const SurfacePoint& center, std::span<const double> sigmas,
+/// surface too small to own a node within reach: the point itself. Without `tone` wanted stays 0, which saves half the
+/// time.
+void read_means(const Film& film, const ToneField* tone, const SurfacePoint& center, std::span<const double> sigmas,
                 std::span<PictureMeans> means, std::vector<FilmPoint>& points);
 
 /// What the predictive loop asks: a film on which every dot is exposed at normal incidence by a perfect cell. Keeps

@@ -47,12 +47,12 @@ TEST(Calibrate, PaintThatShowsNothingIsAnError) {
 TEST(Calibrate, TheSimulatedWedgeReadsWhatIsWanted) {
   const CellDescription cell = test::small_cell();
   for (const Sampler sampler : {Sampler::kCentroid, Sampler::kRandom}) {
-    SampleOptions options;
-    options.sampler = sampler;
+    PictureOptions options;
+    options.sample.sampler = sampler;
     const double pitch = .254e-3;
     const ToneCurve curve = calibrate_tone(wedge_on_film(cell, pitch, options), cell.paint.asked_max);
     // Tones between the curve's own, placed with other seeds.
-    options.seed = 99;
+    options.sample.seed = 99;
     const std::vector<double> wanted{.15, .35, .55, .75, .85};
     std::vector<double> asked;
     for (const double tone : wanted) asked.push_back(curve(tone));

@@ -1,0 +1,67 @@
+#include "daemon/job_sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "config/cell_file.h"
+#include "sampling/levels.h"
+
+namespace hilbrush {
+namespace {
+
+/// Dot, pose, exposure, film and pictures, measured on dry runs from 0.1 to 1 million dots.
+constexpr double kBytesADot = 512;
+/// Dots are numbered with 32 bits in programs and films.
+constexpr std::uint64_t kMostDots = std::numeric_limits<std::uint32_t>::max();
+
+/// The pitch before the dots are placed. A job that names their number has about sqrt(area / count) by half tones; the
+/// spot of few cells is given in millimetres, and of those the curve is chosen by it within a tenth.
+double expected_pitch_m(const JobSettings& settings, const TexturedMesh& mesh) {
+  const SampleOptions options = sample_options(settings);
+  if (options.pitch_m) return *options.pitch_m;
+  return std::sqrt(.5 * mesh.area_m2() / static_cast<double>(*options.dot_count));
+}
+
+}  // namespace
+
+ToneOptions job_tone_options(const CellDescription& cell, const JobSettings& settings, const TexturedMesh& mesh,
+                             std::string& warning) {
+  const double pitch_m = expected_pitch_m(settings, mesh);
+  ToneOptions options = tone_options(cell,
+                                     {.sampler = sampler_name(settings.sampler),
+                                      .curve = curve_name(settings.curve),
+                                      .levels = settings.levels,
+                                      .spot_pitches = spot_diameter_m(cell, pitch_m) / pitch_m},
+                                     warning);
+  options.untextured = settings.untextured;
+  if (settings.tone_curve == ToneMapping::kLinear) {
+    options.curve = {{0, 1}, {0, cell.paint.asked_max}};
+    warning.clear();
+  }
+  return options;
+}
+
+PictureOptions picture_options(const CellDescription& cell, const JobSettings& settings) {
+  PictureOptions options;
+  options.sample = sample_options(settings);
+  options.sample.dot_limit = std::min(options.sample.dot_limit, dot_limit_by_memory());
+  options.levels = energy_levels(settings.levels, cell.paint.asked_max);
+  options.predictive_rounds = settings.predictive_rounds;
+  return options;
+}
+
+std::uint64_t dot_limit_by_memory() {
+  std::ifstream in("/proc/meminfo");
+  std::string key, unit;
+  double kilobytes = 0;
+  while (in >> key >> kilobytes) {
+    if (key == "MemAvailable:")
+      return static_cast<std::uint64_t>(std::min(kilobytes * 1024 / kBytesADot, static_cast<double>(kMostDots)));
+    std::getline(in, unit);
+  }
+  return kMostDots;
+}
+
+}  // namespace hilbrush

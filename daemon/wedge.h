@@ -1,0 +1,49 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "config/job_settings.h"
+#include "planner/cell_description.h"
+#include "sim/film/calibrate.h"
+
+/// A grey wedge to be painted by the real cell, and its readings.
+///
+/// The card is flat, with fields in rows and columns on white; a black corner marks the first field's side. What a
+/// field is asked for rises from field to field, along the rows, up to the cell's asked_max. Flow:
+///   hilbrush calibrate --wedge -o W --sampler S --dpi D    writes W/wedge.wrl, W/wedge.json, W/wedge_steps.json
+///   hilbrush submit W/wedge.wrl --settings W/wedge.json    paints it, on a flat, coated card
+///   an operator measures each field and fills in wedge_steps.json
+///   hilbrush calibrate --measured W/wedge_steps.json --settings W/wedge.json -o C    writes C/tone_curve.json
+namespace hilbrush {
+
+struct WedgeCard {
+  static constexpr int kColumns = 4, kRows = 4;
+
+  double field_m = 0, gap_m = 0;  ///< side of a field, and the white around it
+  std::vector<double> asked;      ///< kColumns * kRows, rising
+
+  double width_m() const { return kColumns * field_m + (kColumns + 1) * gap_m; }
+  double height_m() const { return kRows * field_m + (kRows + 1) * gap_m; }
+};
+
+/// Fields of 60 pitches, at least 10 mm: what densitometers and scanners can read, and many dots wide.
+WedgeCard wedge_card(double pitch_m, double asked_max);
+
+/// The card as VRML 2.0, facing +y, in the cell's own white and black.
+std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& paint);
+
+/// The job that paints it: `settings` with a linear tone curve and nothing that improves on it.
+JobSettings wedge_settings(const JobSettings& settings);
+
+/// The form to fill in: what each field was asked for, and `painted` or `reflectance` still null.
+std::string wedge_form(const WedgeCard& card, const JobSettings& settings);
+
+/// Reads a form that was filled in: each step has `asked` and either `painted` (coverage, 0 to 1) or `reflectance`
+/// (linear light; the cell's paint tells white and black).
+/// @throws InputError with the JSON path for unknown keys, steps without reading, or a wedge that was painted with
+/// another placement than `settings` name.
+std::vector<WedgeStep> read_wedge_form(const std::filesystem::path& file, const JobSettings& settings,
+                                       const CellDescription& cell);
+
+}  // namespace hilbrush

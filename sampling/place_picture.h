@@ -1,0 +1,32 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "sampling/predictive_loop.h"
+#include "sampling/sample.h"
+
+/// From a picture on a surface to dots, with everything that an operator may choose: placement, levels of energy, the
+/// predictive loop. place_dots() and the others do one thing each; this strings them together in the one order that
+/// makes sense:
+///   place by density -> levels -> (predict the picture, ask again: predictive_loop.h)
+namespace hilbrush {
+
+struct PictureOptions {
+  SampleOptions sample;
+  std::vector<double> levels = {1};  ///< see energy_levels()
+  int predictive_rounds = 0;
+};
+
+struct PictureReport {
+  SampleReport path;
+  PredictiveReport predictive;
+  std::vector<std::uint64_t> dots_of_level;  ///< as many as there are levels
+};
+
+/// `tone` says what is asked for, `curve` and `tone_options` what it was made with. `predict` is called only if there
+/// are predictive rounds. Deterministic. @throws InputError as place_dots().
+DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, const ToneOptions& tone_options,
+                          const PictureOptions& options, const PicturePredictor& predict,
+                          PictureReport* report = nullptr, const Progress& progress = {});
+
+}  // namespace hilbrush
