@@ -1,0 +1,222 @@
+#include "sampling/laminar.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "sampling/check.h"
+#include "sampling/curve/put_on_surface.h"
+#include "sampling/disk/components.h"
+#include "sampling/input_error.h"
+#include "sampling/laminar/contours.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Tone is looked up so many times a pitch along a contour.
+constexpr double kLooksPerPitch = 8;
+/// Rounds of the search for the pitch, and when it has ended.
+constexpr int kMostRounds = 8;
+constexpr double kCloseEnough = .002;
+constexpr double kMostSlices = 1e7;
+
+SurfacePoint point_on(const ContourPiece& piece, double share) {
+  return {piece.triangle, (1 - share) * piece.from_b + share * piece.to_b};
+}
+
+/// Walks along a piece in short steps: visit(share of the piece before the step, share after it, asked tone times
+/// length).
+template <class Visit>
+void walk_piece(const ToneField& tone, const ContourPiece& piece, double pitch_m, Visit visit) {
+  if (tone.is_blank(piece.triangle)) return;
+  const double length = piece.length();
+  const auto steps = static_cast<int>(std::clamp(std::ceil(length / pitch_m * kLooksPerPitch), 1., 1e6));
+  for (int i = 0; i < steps; ++i) {
+    const double asked = tone.asked(point_on(piece, (i + .5) / steps));
+    if (asked > 0) visit(static_cast<double>(i) / steps, (i + 1.) / steps, asked * length / steps);
+  }
+}
+
+/// Asked tone times length, summed over all slices: what is to be shared out among the dots.
+double toned_length(const Slices& slices, const ToneField& tone, double pitch_m) {
+  std::vector<double> of_slice(slices.count(), 0);
+  tbb::parallel_for(std::size_t{0}, slices.count(), [&](std::size_t k) {
+    for (const ContourPiece& piece : slices.pieces(k))
+      walk_piece(tone, piece, pitch_m, [&](double, double, double mass) { of_slice[k] += mass; });
+  });
+  double sum = 0;
+  for (const double mass : of_slice) sum += mass;
+  return sum;
+}
+
+/// A first guess at toned_length * pitch: a slice meets a wall that leans by its sine.
+double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
+  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
+  double mass = 0;
+  for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
+    const Vector3d normal = mesh.area_vector(t).normalized();
+    if (!tone.is_blank(t)) mass += tone.integrate(t, whole).mass * std::hypot(normal.x(), normal.y());
+  }
+  return mass;
+}
+
+double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, std::uint64_t count) {
+  const double wanted = static_cast<double>(count);
+  double pitch = std::sqrt(mass / wanted), best = pitch, best_error = 1e300;
+  for (int round = 0; round < kMostRounds && pitch > 0 && best_error > kCloseEnough; ++round) {
+    const double found = toned_length(Slices(mesh, pitch), tone, pitch) / pitch;
+    const double error = std::abs(found / wanted - 1);
+    if (error < best_error) best_error = error, best = pitch;
+    pitch = found > 0 ? pitch * std::sqrt(found / wanted) : pitch / 2;
+  }
+  if (!(best > 0)) throw InputError("", "no horizontal slice meets a surface that is to be painted");
+  return best;
+}
+
+void check_limit(double count, std::uint64_t limit) {
+  if (!(count <= static_cast<double>(limit)))
+    throw InputError("", "the object would need " + std::to_string(static_cast<std::uint64_t>(std::min(count, 1e18))) +
+                             " dots, more than the limit of " + std::to_string(limit) + ": lower the dpi or the size");
+}
+
+/// Where the walk is, and where along it the dots go.
+class SliceWalk {
+ public:
+  SliceWalk(const SurfaceCurve::Implementation& curve, const std::vector<std::uint32_t>& component_of,
+            const ToneField& tone, double pitch_m, double spacing_m)
+      : curve_(curve), component_of_(component_of), tone_(tone), pitch_(pitch_m), spacing_(spacing_m) {}
+
+  void walk_slice(std::vector<Contour> contours) {
+    while (!contours.empty()) {
+      const std::size_t next = nearest(contours);
+      Contour contour = std::move(contours[next]);
+      contours.erase(contours.begin() + static_cast<std::ptrdiff_t>(next));
+      begin_nearby(contour);
+      for (const ContourPiece& piece : contour.pieces) walk(piece);
+      here_ = contour.pieces.back().to_O;
+    }
+  }
+
+  std::vector<Dot> take_dots() { return std::move(dots_); }
+
+ private:
+  double distance_to(const Vector3d& place) const { return here_ ? (place - *here_).norm() : 0; }
+
+  /// The contour with the nearest end.
+  std::size_t nearest(const std::vector<Contour>& contours) const {
+    std::size_t best = 0;
+    double best_distance = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < contours.size(); ++i) {
+      const auto& pieces = contours[i].pieces;
+      const double distance = std::min(distance_to(pieces.front().from_O), distance_to(pieces.back().to_O));
+      if (distance < best_distance) best = i, best_distance = distance;
+    }
+    return best;
+  }
+
+  /// Turns a closed contour to its nearest piece, an open one to its nearer end.
+  void begin_nearby(Contour& contour) const {
+    auto& pieces = contour.pieces;
+    if (contour.is_closed) {
+      const auto first = std::min_element(pieces.begin(), pieces.end(), [&](const auto& a, const auto& b) {
+        return distance_to(a.from_O) < distance_to(b.from_O);
+      });
+      std::rotate(pieces.begin(), first, pieces.end());
+    } else if (distance_to(pieces.back().to_O) < distance_to(pieces.front().from_O)) {
+      std::reverse(pieces.begin(), pieces.end());
+      for (ContourPiece& piece : pieces) piece.reverse();
+    }
+  }
+
+  void walk(const ContourPiece& piece) {
+    walk_piece(tone_, piece, pitch_, [&](double from, double to, double mass) {
+      const double before = std::exchange(passed_, passed_ + mass);
+      for (double next = next_dot(); passed_ >= next; next = next_dot()) {
+        const double share = std::clamp((next - before) / mass, 0., 1.);
+        dots_.push_back(
+            make_dot(curve_, tone_, point_on(piece, from + share * (to - from)), component_of_[piece.triangle]));
+      }
+    });
+  }
+
+  /// The toned length at which the next dot is due.
+  double next_dot() const { return (static_cast<double>(dots_.size()) + .5) * spacing_; }
+
+  const SurfaceCurve::Implementation& curve_;
+  const std::vector<std::uint32_t>& component_of_;
+  const ToneField& tone_;
+  double pitch_, spacing_;
+  double passed_ = 0;  ///< toned length so far
+  std::optional<Vector3d> here_;
+  std::vector<Dot> dots_;
+};
+
+double path_length(const std::vector<Dot>& dots) {
+  double length = 0;
+  for (std::size_t i = 1; i < dots.size(); ++i) length += (dots[i].position_O - dots[i - 1].position_O).norm();
+  return length;
+}
+
+std::vector<std::uint32_t> components_of(const TexturedMesh& mesh, const Neighbours& neighbours) {
+  std::vector<std::uint32_t> component_of(mesh.triangle_count(), 0);
+  std::uint32_t number = 0;
+  for (const Component& component : find_components(mesh, neighbours)) {
+    for (const std::uint32_t t : component.triangles) component_of[t] = number;
+    ++number;
+  }
+  return component_of;
+}
+
+double painted_area(const TexturedMesh& mesh, const ToneField& tone) {
+  double area = 0;
+  for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
+    if (!tone.is_blank(t)) area += mesh.area_vector(t).norm();
+  return area;
+}
+
+}  // namespace
+
+DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const SampleOptions& options,
+                          SampleReport* report, const Progress& progress) {
+  if (options.pitch_m.has_value() == options.dot_count.has_value())
+    throw InputError("", "give either dpi or the number of dots, not both and not neither");
+  if (options.pitch_m && !(*options.pitch_m > 0)) throw InputError("", "the pitch must be more than 0 mm");
+  if (options.dot_count && *options.dot_count < 1) throw InputError("", "the number of dots must be at least 1");
+  DotSequence sequence;
+  const double mass = sliced_mass(mesh, tone);
+  const double pitch = options.pitch_m ? *options.pitch_m : pitch_for(mesh, tone, mass, *options.dot_count);
+  check_limit(options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch), options.dot_limit);
+  const auto [low, high] = bounds(mesh);
+  if ((high.z() - low.z()) / pitch > kMostSlices) throw InputError("", "too many slices: lower the dpi or the size");
+  sequence.pitch_m = pitch;
+  const Slices slices(mesh, pitch);
+  const double length = toned_length(slices, tone, pitch);
+  const std::uint64_t count = options.dot_count.value_or(static_cast<std::uint64_t>(std::llround(length / pitch)));
+  if (count == 0) return sequence;
+
+  SurfaceCurve::Implementation surroundings(mesh);
+  surroundings.neighbours = find_neighbours(mesh.triangles);
+  surroundings.corner_normals = smooth_corner_normals(mesh, surroundings.neighbours);
+  const std::vector<std::uint32_t> component_of = components_of(mesh, surroundings.neighbours);
+  SliceWalk walk(surroundings, component_of, tone, pitch, length / static_cast<double>(count));
+  for (std::size_t k = 0; k < slices.count(); ++k) {
+    walk.walk_slice(join(slices.pieces(k)));
+    if (progress) progress(static_cast<double>(k + 1) / static_cast<double>(slices.count()));
+  }
+  sequence.dots = walk.take_dots();
+  CHECK_EQ(sequence.dots.size(), count);
+  if (report) {
+    report->path_length_m = path_length(sequence.dots);
+    report->path_constant = report->path_length_m / std::sqrt(static_cast<double>(count) * painted_area(mesh, tone));
+    report->patch_count = slices.piece_count();
+  }
+  return sequence;
+}
+
+}  // namespace hilbrush
