@@ -8,6 +8,7 @@
 #include "daemon/report.h"
 #include "daemon/wedge.h"
 #include "sampling/input_error.h"
+#include "sampling/levels.h"
 
 namespace hilbrush {
 namespace {
@@ -21,6 +22,26 @@ void make_folder(const std::filesystem::path& folder) {
 
 double pitch_of(const JobSettings& settings) {
   return 25.4e-3 / settings.dpi.value_or(kDefaultDpi);
+}
+
+ToneCurve simulated_curve(const CellDescription& cell, const JobSettings& settings, const PictureOptions& options) {
+  const Wedge wedge = wedge_on_film(cell, pitch_of(settings), options);
+  if (options.levels.size() == 1) return calibrate_tone(wedge, cell.paint.asked_max);
+  constexpr int kSteps = 64;
+  std::vector<double> shares;
+  for (int i = 1; i <= kSteps; ++i) shares.push_back(static_cast<double>(i) / kSteps);
+  return tone_curve_of(wedge(wedge_steps(shares, cell.paint.asked_max, options.levels)), cell.paint.asked_max,
+                       options.levels);
+}
+
+ToneCurve measured_curve(const CellDescription& cell, const JobSettings& settings, const PictureOptions& options,
+                         const std::filesystem::path& measured) {
+  const std::vector<WedgeStep> steps = read_wedge_form(measured, settings, cell);
+  try {
+    return tone_curve_of(steps, cell.paint.asked_max, options.levels);
+  } catch (const InputError& error) {
+    throw InputError(measured.string(), error.sentence());
+  }
 }
 
 std::string curve_entry(const ToneCurve& curve, const JobSettings& settings, const CellDescription& cell) {
@@ -45,17 +66,9 @@ std::string run_calibrate(const PipelineRequest& request, const std::filesystem:
   make_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   if (listener.on_progress) listener.on_progress("paint", 0);
-  ToneCurve curve;
-  if (measured.empty()) {
-    curve = calibrate_tone(wedge_on_film(cell, pitch_of(request.settings), picture_options(cell, request.settings)),
-                           cell.paint.asked_max);
-  } else {
-    try {
-      curve = tone_curve_of(read_wedge_form(measured, request.settings, cell), cell.paint.asked_max);
-    } catch (const InputError& error) {
-      throw error.at().empty() ? InputError(measured.string(), error.sentence()) : error;
-    }
-  }
+  const PictureOptions options = picture_options(cell, request.settings);
+  const ToneCurve curve = measured.empty() ? simulated_curve(cell, request.settings, options)
+                                           : measured_curve(cell, request.settings, options, measured);
   const std::string text = curve_entry(curve, request.settings, cell);
   write_text_file(request.output / "tone_curve.json", text);
   return text;
@@ -65,7 +78,8 @@ std::string run_wedge(const PipelineRequest& request) {
   make_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   const JobSettings settings = wedge_settings(request.settings);
-  const WedgeCard card = wedge_card(pitch_of(settings), cell.paint.asked_max);
+  const WedgeCard card =
+      wedge_card(pitch_of(settings), cell.paint.asked_max, energy_levels(settings.levels, cell.paint.asked_max));
   write_text_file(request.output / "wedge.wrl", wedge_model(card, cell.paint));
   write_text_file(request.output / "wedge.json", job_settings_to_json(settings) + "\n");
   write_text_file(request.output / "wedge_steps.json", wedge_form(card, settings));

@@ -73,10 +73,9 @@ void refuse_other_placement(JsonObject& json, const JobSettings& settings) {
 
 }  // namespace
 
-WedgeCard wedge_card(double pitch_m, double asked_max) {
-  WedgeCard card{std::max(kFieldPitches * pitch_m, kFieldLeastM), kGapM, {}};
-  for (const double share : kShares) card.asked.push_back(share * asked_max);
-  return card;
+WedgeCard wedge_card(double pitch_m, double asked_max, std::span<const double> levels) {
+  return {std::max(kFieldPitches * pitch_m, kFieldLeastM), kGapM,
+          wedge_steps({kShares.begin(), kShares.end()}, asked_max, levels)};
 }
 
 std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& paint) {

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,7 @@ struct WedgeCard {
 };
 
 /// Fields of 60 pitches, at least 10 mm: what densitometers and scanners can read, and many dots wide.
-WedgeCard wedge_card(double pitch_m, double asked_max);
+WedgeCard wedge_card(double pitch_m, double asked_max, std::span<const double> levels);
 
 /// The card as VRML 2.0, facing +y, in the cell's own white and black.
 std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& paint);

@@ -11,7 +11,7 @@
 namespace hilbrush {
 namespace {
 
-/// Width, in wanted tone, of the ramp by which the density falls from 1 where the next level takes over: a curve has no
+/// Width, in wanted tone, of the ramp by which the density falls where the next level takes over: a curve has no
 /// jumps.
 constexpr double kRamp = 1e-5;
 
@@ -41,18 +41,25 @@ std::vector<double> energy_levels(int count, double asked_max) {
   CHECK_LE(1, count);
   CHECK_LE(count, kMostLevels);
   if (count == 1) return {1};
-  std::vector<double> levels;
-  for (int k = 1; k <= count; ++k) levels.push_back(asked_max * k / count);
+  std::vector<double> levels;  // for paint whose black takes twice the full energy
+  if (count == 2) levels = {.75, 3};
+  if (count == 3) levels = {.8, 1.6, 3};
+  if (count == 4) levels = {.67, 1.1, 2, 3};
+  for (double& level : levels) level *= asked_max / 2;
   return levels;
 }
 
+std::size_t level_for(std::span<const double> levels, double asked) {
+  constexpr double kRounding = 1e-9;  // a tone at the very end of a level still belongs to it
+  const auto enough = std::lower_bound(levels.begin(), levels.end() - 1, asked / kEnoughDots * (1 - kRounding));
+  return static_cast<std::size_t>(enough - levels.begin());
+}
+
 double dots_for(std::span<const double> levels, double asked) {
-  const auto enough = std::lower_bound(levels.begin(), levels.end(), asked);
-  return asked / (enough == levels.end() ? levels.back() : *enough);
+  return asked / levels[level_for(levels, asked)];
 }
 
 ToneCurve density_curve(const ToneCurve& curve, std::span<const double> levels) {
-  if (levels.size() < 2) return curve;
   const ToneCurve asked = curve.wanted.empty() ? ToneCurve{{0, 1}, {0, 1}} : curve;
   // Knots: the curve's own, and two at each place where a level is used up.
   ToneCurve density;
@@ -62,9 +69,9 @@ ToneCurve density_curve(const ToneCurve& curve, std::span<const double> levels) 
   };
   std::size_t level = 0;
   for (std::size_t k = 0; k < asked.wanted.size(); ++k) {
-    while (level + 1 < levels.size() && asked.asked[k] > levels[level]) {
-      const double taken_over = wanted_for(asked, levels[level]);
-      add(taken_over, 1);
+    while (level + 1 < levels.size() && asked.asked[k] > kEnoughDots * levels[level]) {
+      const double taken_over = wanted_for(asked, kEnoughDots * levels[level]);
+      add(taken_over, kEnoughDots);
       const double next = std::min(taken_over + kRamp, asked.wanted[k]);
       add(next, asked(next) / levels[level + 1]);
       ++level;
@@ -77,7 +84,10 @@ ToneCurve density_curve(const ToneCurve& curve, std::span<const double> levels) 
 void assign_levels(DotSequence& dots, const ToneField& asked, const ToneField& density,
                    std::span<const double> levels) {
   CHECK(&asked.mesh() == &density.mesh());
-  if (levels.size() < 2) return;
+  if (levels.size() < 2) {
+    for (Dot& dot : dots.dots) dot.level = static_cast<float>(levels.front());
+    return;
+  }
   tbb::parallel_for(std::size_t{0}, dots.dots.size(), [&](std::size_t i) {
     dots.dots[i].level = static_cast<float>(local_energy(dots.dots[i], dots.pitch_m, asked, density));
   });

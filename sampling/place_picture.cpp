@@ -11,7 +11,7 @@ namespace {
 
 /// The field of the number of dots, if it is another than that of the energy.
 std::optional<ToneField> density_field(const ToneField& tone, ToneOptions options, const std::vector<double>& levels) {
-  if (levels.size() < 2) return std::nullopt;
+  if (levels == std::vector<double>{1}) return std::nullopt;
   options.curve = density_curve(options.curve, levels);
   return std::optional<ToneField>(std::in_place, tone.mesh(), options);
 }

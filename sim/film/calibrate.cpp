@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "sampling/input_error.h"
+#include "sampling/levels.h"
 #include "sampling/tone_field.h"
 #include "sim/film/film.h"
 #include "sim/film/picture_means.h"
@@ -108,19 +109,49 @@ Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOp
   };
 }
 
-ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max) {
+std::vector<double> wedge_steps(std::vector<double> shares, double asked_max, std::span<const double> levels) {
+  for (double& share : shares) share *= asked_max;
+  for (std::size_t k = 0; k + 1 < levels.size(); ++k) {
+    const double last = kEnoughDots * levels[k];
+    const auto nearest = std::min_element(shares.begin(), shares.end(),
+                                          [&](double a, double b) { return std::abs(a - last) < std::abs(b - last); });
+    if (nearest != shares.end()) *nearest = last;
+  }
+  return shares;
+}
+
+ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max, std::span<const double> levels) {
   constexpr std::size_t kStepsMin = 5;
+  constexpr int kTones = 40;  // fine enough that the bends of the wedge's own steps are kept
+  constexpr double kJump = 1e-4;
   if (steps.size() < kStepsMin)
     throw InputError("", "the wedge has " + std::to_string(steps.size()) + " steps; a curve needs at least " +
                              std::to_string(kStepsMin));
-  steps.push_back({0, 0});
-  steps = monotone(std::move(steps));
-  if (!(steps.back().painted > 0)) throw InputError("", "the wedge reads no paint at all, whatever was asked");
+  std::vector<std::vector<WedgeStep>> of_level(levels.size());
+  for (const WedgeStep& step : steps)
+    if (step.asked > 0) of_level[level_for(levels, step.asked)].push_back(step);
+  of_level.front().push_back({0, 0});
+  std::erase_if(of_level, [](const auto& own) { return own.empty(); });
+  for (auto& own : of_level) own = monotone(std::move(own));
+  if (!(of_level.back().back().painted > 0))
+    throw InputError("", "the wedge reads no paint at all, whatever was asked");
+
   ToneCurve curve;
-  constexpr int kTones = 40;  // fine enough that the bends of the wedge's own steps are kept
+  const auto add = [&](double wanted, double asked) {
+    const double least = curve.asked.empty() ? 0 : curve.asked.back();
+    curve.wanted.push_back(wanted), curve.asked.push_back(std::max(least, asked));
+  };
+  auto level = of_level.begin();
   for (int i = 0; i <= kTones; ++i) {
-    curve.wanted.push_back(static_cast<double>(i) / kTones);
-    curve.asked.push_back(i == 0 ? 0 : asked_for(steps, curve.wanted.back(), asked_max));
+    const double wanted = static_cast<double>(i) / kTones;
+    while (level + 1 != of_level.end() && wanted > level->back().painted) {
+      const double taken_over = level->back().painted;
+      if (curve.wanted.back() < taken_over) add(taken_over, level->back().asked);
+      ++level;
+      if (taken_over + kJump < wanted && curve.wanted.back() < taken_over + kJump)
+        add(taken_over + kJump, asked_for(*level, taken_over, asked_max));
+    }
+    add(wanted, i == 0 ? 0 : asked_for(*level, wanted, asked_max));
   }
   return curve;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "planner/cell_description.h"
@@ -29,8 +30,14 @@ Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOp
 /// @throws InputError if the wedge has too few readings or shows no paint at all.
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max);
 
-/// The same from one wedge that was painted and measured once: linear between its steps.
+/// The steps that a wedge for these levels should have: `shares` of asked_max, some moved so that each level's last
+/// tone is among them.
+std::vector<double> wedge_steps(std::vector<double> shares, double asked_max, std::span<const double> levels);
+
+/// The curve from a wedge that was painted and measured once, linear between its steps. With several levels
+/// (sampling/levels.h) each has steps of its own, and where the next level takes over the curve jumps: the same energy
+/// in fewer, stronger dots covers less.
 /// @throws InputError if it has fewer than five steps, or shows no paint at all.
-ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max);
+ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max, std::span<const double> levels);
 
 }  // namespace hilbrush
