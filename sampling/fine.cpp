@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector3f;
 
 /// Steps of a dot, in pitches, in the first and after the last pass.
-constexpr float kFirstStep = .12f, kLastStep = .01f;
+constexpr float kFirstStep = .4f, kLastStep = .02f;
 /// How long a dot remembers which way it went, and how steep it was.
 constexpr float kMomentum = .8f, kSteepness = .95f;
 /// Dots whose gradient is below this share of the common one hardly need to move.

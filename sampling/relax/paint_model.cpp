@@ -48,6 +48,7 @@ PaintModel::PaintModel(const SurfaceCurve& curve, const ToneField& tone, double 
   tabulate(spot);
   lay_nodes(curve, tone);
   gather_blobs();
+  link_blobs();
   node_grid_ = std::make_unique<CubeGrid>(places_, spot_reach_m());
 }
 
@@ -92,14 +93,10 @@ void PaintModel::gather_blobs() {
     blob.place += places_[i];
     blob.normal += normals_[i];
   }
-  std::vector<Vector3f> places;
   for (Blob& blob : blobs_) {
     blob.place /= static_cast<float>(blob.end - blob.begin);
     blob.normal.normalize();
-    places.push_back(blob.place);
   }
-  blob_grid_ =
-      std::make_unique<CubeGrid>(places, kBlurCutSigmas * std::sqrt(kBlurSigma2) * static_cast<float>(pitch_m_));
 }
 
 float PaintModel::spot_reach_m() const {
@@ -139,23 +136,47 @@ void PaintModel::collect_dose(std::span<const Exposure> exposures) {
                     });
 }
 
-void PaintModel::blur() {
+void PaintModel::link_blobs() {
   const auto pitch = static_cast<float>(pitch_m_);
   const float sigma2 = kBlurSigma2 * pitch * pitch, cut2 = kBlurCutSigmas * kBlurCutSigmas * sigma2;
   // A node is 1/kNodesAPitch2 of a pitch squared: the kernel's sum over nodes is 1.
   const auto scale = static_cast<float>(1 / (2 * std::numbers::pi * static_cast<double>(kBlurSigma2) * kNodesAPitch2));
+  std::vector<Vector3f> places;
+  for (const Blob& blob : blobs_) places.push_back(blob.place);
+  const CubeGrid grid(places, kBlurCutSigmas * std::sqrt(sigma2));
+  const auto visit_links = [&](std::size_t b, auto visit) {
+    grid.visit_around(places[b], [&](std::uint32_t other) {
+      const float r2 = (places[other] - places[b]).squaredNorm();
+      if (r2 > cut2 || blobs_[b].normal.dot(blobs_[other].normal) <= 0) return;
+      visit(Link{other, scale * std::exp(-r2 / (2 * sigma2))});
+    });
+  };
+  link_begins_.assign(blobs_.size() + 1, 0);
+  tbb::parallel_for(std::size_t{0}, blobs_.size(),
+                    [&](std::size_t b) { visit_links(b, [&](const Link&) { ++link_begins_[b + 1]; }); });
+  std::partial_sum(link_begins_.begin(), link_begins_.end(), link_begins_.begin());
+  links_.resize(link_begins_.back());
+  tbb::parallel_for(std::size_t{0}, blobs_.size(), [&](std::size_t b) {
+    std::size_t at = link_begins_[b];
+    visit_links(b, [&](const Link& link) { links_[at++] = link; });
+  });
+}
+
+void PaintModel::blur() {
+  const auto pitch = static_cast<float>(pitch_m_);
+  const float per_sigma2 = 1 / (kBlurSigma2 * pitch * pitch);
   tbb::parallel_for(std::size_t{0}, blobs_.size(), [&](std::size_t b) {
     Blob& blob = blobs_[b];
-    blob.blurred = 0;
-    blob.slope.setZero();
-    blob_grid_->visit_around(blob.place, [&](std::uint32_t other) {
-      const Vector3f way = blobs_[other].place - blob.place;
-      const float r2 = way.squaredNorm();
-      if (r2 > cut2 || blob.normal.dot(blobs_[other].normal) <= 0) return;
-      const float share = scale * std::exp(-r2 / (2 * sigma2)) * blobs_[other].error;
-      blob.blurred += share;
-      blob.slope += share / sigma2 * way;
-    });
+    float blurred = 0;
+    Vector3f slope = Vector3f::Zero();
+    for (std::size_t k = link_begins_[b]; k < link_begins_[b + 1]; ++k) {
+      const Blob& other = blobs_[links_[k].blob];
+      const float share = links_[k].weight * other.error;
+      blurred += share;
+      slope += share * (other.place - blob.place);
+    }
+    blob.blurred = blurred;
+    blob.slope = per_sigma2 * slope;
   });
 }
 

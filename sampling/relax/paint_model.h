@@ -37,8 +37,15 @@ class PaintModel {
     Eigen::Vector3f slope = Eigen::Vector3f::Zero();  ///< of it
   };
 
+  /// A blob within reach of the blur, and how much of its error arrives.
+  struct Link {
+    std::uint32_t blob;
+    float weight;
+  };
+
   void lay_nodes(const SurfaceCurve& curve, const ToneField& tone);
   void gather_blobs();
+  void link_blobs();
   void tabulate(const SpotModel& spot);
   float spot_reach_m() const;
   /// Dose of one exposure at a node, with the way across the beam from dot to node; 0 out of its light.
@@ -53,9 +60,10 @@ class PaintModel {
   std::vector<float> wanted_, dose_;
   std::vector<float> pull_;  ///< per node: twice the twice blurred error times the slope of the paint's answer
   std::vector<Blob> blobs_;
-  std::vector<std::uint32_t> blob_of_;
+  std::vector<std::size_t> link_begins_;  ///< per blob, into links_
+  std::vector<Link> links_;
   std::vector<float> coverage_, coverage_slope_;
-  std::unique_ptr<CubeGrid> node_grid_, blob_grid_;
+  std::unique_ptr<CubeGrid> node_grid_;
 };
 
 }  // namespace hilbrush
