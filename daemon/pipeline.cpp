@@ -166,8 +166,9 @@ void refuse_faulty_program(const std::vector<ProgramFault>& faults) {
 }
 
 DotSequence sample_dots(Workpiece& piece, Stages& stages) {
-  const auto curve = stages.run(
-      "curve", [&](const Progress& progress) { return std::make_unique<SurfaceCurve>(piece.mesh, progress); });
+  const auto curve = stages.run("curve", [&](const Progress& progress) {
+    return std::make_unique<SurfaceCurve>(piece.mesh, CurveKind::kHilbert, progress);
+  });
   piece.report.mesh.components = curve->components();
   auto dots = stages.run("dots", [&](const Progress& progress) {
     return place_picture(*curve, *piece.tone, piece.tone_options, picture_options(piece.cell, piece.settings),

@@ -3,7 +3,6 @@
 #include <array>
 #include <bit>
 #include <cstring>
-#include <fstream>
 #include <sstream>
 
 #include "sampling/check.h"
@@ -17,14 +16,14 @@ static_assert(std::endian::native == std::endian::little, "the rows are written 
 constexpr std::size_t kRowBytes = 3 * sizeof(double) + 5 * sizeof(float) + sizeof(std::uint32_t) + 1;
 constexpr std::size_t kRowsAtOnce = 4096;
 
-std::string header(const DotSequence& sequence, std::span<const std::string> reason_names) {
+std::string header(double pitch_m, std::uint64_t dot_count, std::span<const std::string> reason_names) {
   std::ostringstream out;
   out.precision(12);
   out << "ply\nformat binary_little_endian 1.0\ncomment dots of Hilbrush in painting order; metres, object frame\n"
-      << "comment pitch_m " << sequence.pitch_m << '\n';
+      << "comment pitch_m " << pitch_m << '\n';
   for (std::size_t code = 0; code < reason_names.size(); ++code)
     out << "comment reason " << code << ' ' << reason_names[code] << '\n';
-  out << "element vertex " << sequence.dots.size() << '\n';
+  out << "element vertex " << dot_count << '\n';
   for (const char* name : {"x", "y", "z"}) out << "property double " << name << '\n';
   for (const char* name : {"nx", "ny", "nz", "tone", "level"}) out << "property float " << name << '\n';
   out << "property uint component\nproperty uchar reason\nend_header\n";
@@ -48,22 +47,39 @@ char* put_dot(char* at, const Dot& dot, std::uint8_t reason) {
 
 }  // namespace
 
+DotsFile::DotsFile(const std::filesystem::path& file, double pitch_m, std::uint64_t dot_count,
+                   std::span<const std::string> reason_names)
+    : file_(file), out_(file, std::ios::binary | std::ios::trunc), missing_(dot_count) {
+  if (!out_) throw InputError(file.string(), "can't be opened for writing");
+  const std::string text = header(pitch_m, dot_count, reason_names);
+  out_.write(text.data(), static_cast<std::streamsize>(text.size()));
+}
+
+void DotsFile::add(std::span<const Dot> dots, std::span<const std::uint8_t> reasons) {
+  CHECK(reasons.empty() || reasons.size() == dots.size());
+  CHECK_LE(dots.size(), missing_);
+  missing_ -= dots.size();
+  std::array<char, kRowBytes * kRowsAtOnce> rows;
+  for (std::size_t i = 0; i < dots.size();) {
+    char* end = rows.data();
+    for (std::size_t k = 0; k < kRowsAtOnce && i < dots.size(); ++k, ++i)
+      end = put_dot(end, dots[i], reasons.empty() ? std::uint8_t{0} : reasons[i]);
+    out_.write(rows.data(), end - rows.data());
+  }
+}
+
+void DotsFile::close() {
+  CHECK_EQ(missing_, std::uint64_t{0});
+  out_.close();
+  if (!out_) throw InputError(file_.string(), "can't be written: is the disk full?");
+}
+
 void write_dots(const DotSequence& sequence, std::span<const std::uint8_t> reasons,
                 std::span<const std::string> reason_names, const std::filesystem::path& file) {
   CHECK_EQ(reasons.size(), sequence.dots.size());
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  if (!out) throw InputError(file.string(), "can't be opened for writing");
-  const std::string text = header(sequence, reason_names);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  std::array<char, kRowBytes * kRowsAtOnce> rows;
-  for (std::size_t i = 0; i < sequence.dots.size();) {
-    char* end = rows.data();
-    for (std::size_t k = 0; k < kRowsAtOnce && i < sequence.dots.size(); ++k, ++i)
-      end = put_dot(end, sequence.dots[i], reasons[i]);
-    out.write(rows.data(), end - rows.data());
-  }
+  DotsFile out(file, sequence.pitch_m, sequence.dots.size(), reason_names);
+  out.add(sequence.dots, reasons);
   out.close();
-  if (!out) throw InputError(file.string(), "can't be written: is the disk full?");
 }
 
 }  // namespace hilbrush

@@ -1,249 +1,124 @@
 #include "sampling/sample.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <optional>
-#include <utility>
 
 #include "sampling/blue.h"
 #include "sampling/check.h"
-#include "sampling/curve/put_on_surface.h"
-#include "sampling/curve/sequence.h"
+#include "sampling/curve/curve_mass.h"
+#include "sampling/curve/dot_block.h"
 #include "sampling/input_error.h"
 
 namespace hilbrush {
 namespace {
 
-/// Groups of base quads are what threads share out; there are always as many, so that the result does not depend on the
+/// Dots are made in blocks whose size depends on nothing but their number, so that the result does not depend on the
 /// threads.
-constexpr std::size_t kGroupCount = 128;
-/// After so many groups the caller hears how far the work has come.
-constexpr std::size_t kGroupsAtOnce = 16;
+constexpr std::uint64_t kMostDotsInBlock = 4096, kLeastDotsInBlock = 128, kBlocksAtLeast = 64;
+/// So many blocks are made at once, while the visitor has as many.
+constexpr std::uint64_t kBlocksAtOnce = 32;
 
-struct QuadIndex {
-  std::uint32_t sheet = 0, quad = 0;
-};
-
-/// All base quads in order of the curve, with the mass up to each: mass_before[i] .. mass_before[i + 1] is quad i's
-/// stretch.
-struct CurveMass {
-  std::vector<QuadIndex> quads;
-  std::vector<double> mass_before;
-
-  double total() const { return mass_before.back(); }
-};
-
-CurveMass measure_curve(const SurfaceCurve::Implementation& curve, const ToneField& tone) {
-  CurveMass result;
-  for (std::uint32_t s = 0; s < curve.sheets.size(); ++s)
-    for (std::uint32_t q = 0; q < curve.sheets[s].base_quads.size(); ++q) result.quads.push_back({s, q});
-  result.mass_before.assign(result.quads.size() + 1, 0);
-  tbb::parallel_for(std::size_t{0}, result.quads.size(), [&](std::size_t i) {
-    const Sheet& sheet = curve.sheets[result.quads[i].sheet];
-    result.mass_before[i + 1] = mass_of(sheet, sheet.base_quads[result.quads[i].quad], tone);
-  });
-  std::partial_sum(result.mass_before.begin(), result.mass_before.end(), result.mass_before.begin());
-  return result;
-}
-
-/// What one group of base quads leaves behind for the serial end.
-struct GroupResult {
-  std::vector<std::pair<std::uint64_t, Stratum>> open_strata;  ///< those that may go on in another group
-  std::size_t patch_count = 0;
-  double painted_area_m2 = 0;
-};
-
-class Placement {
+/// Follows the dots for the report.
+class PathMeter {
  public:
-  Placement(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SampleOptions& options,
-            const CurveMass& mass, std::uint64_t count)
-      : curve_(curve),
-        tone_(tone),
-        mass_(mass),
-        count_(count),
-        rule_{mass.total() / static_cast<double>(count), options.omega} {
-    if (options.sampler != Sampler::kCentroid) places_.emplace(options.sampler, count, options.seed);
-    dots_.resize(count);
+  PathMeter(const CurveMass::Implementation& mass, SampleReport& report) : mass_(mass), report_(report) {
+    report_ = {};
+    report_.components.resize(mass.curve.components.size());
   }
 
-  std::vector<Dot> place(SampleReport& report, const Progress& progress) {
-    std::vector<GroupResult> results(kGroupCount);
-    for (std::size_t begin = 0; begin < kGroupCount; begin += kGroupsAtOnce) {
-      tbb::parallel_for(begin, begin + kGroupsAtOnce, [&](std::size_t g) { results[g] = place_group(g); });
-      if (progress) progress(static_cast<double>(begin + kGroupsAtOnce) / kGroupCount);
+  void follow(const DotBlock& block) {
+    for (const Dot& dot : block.dots) {
+      ComponentPath& component = report_.components[dot.component];
+      ++component.dot_count;
+      if (has_last_) {
+        const double step = (dot.position_O - last_O_).norm();
+        report_.path_length_m += step;
+        if (dot.component == last_component_) component.path_length_m += step;
+      }
+      last_O_ = dot.position_O;
+      last_component_ = dot.component;
+      has_last_ = true;
     }
-    close_open_strata(results);
-    for (const GroupResult& result : results) {
-      report.patch_count += result.patch_count;
-      painted_area_m2_ += result.painted_area_m2;
+    auto& depths = report_.patches_at_depth;
+    depths.resize(std::max(depths.size(), block.patches_at_depth.size()));
+    for (std::size_t depth = 0; depth < block.patches_at_depth.size(); ++depth) {
+      depths[depth] += block.patches_at_depth[depth];
+      report_.patch_count += block.patches_at_depth[depth];
     }
-    CHECK_EQ(placed_count(), count_);
-    return std::move(dots_);
   }
 
-  double painted_area_m2() const { return painted_area_m2_; }
+  void finish(std::uint64_t count) {
+    for (std::size_t s = 0; s < mass_.curve.sheets.size(); ++s) {
+      report_.painted_area_m2 += mass_.painted_area_m2[s];
+      report_.components[mass_.curve.sheets[s].component].painted_area_m2 += mass_.painted_area_m2[s];
+    }
+    if (count > 1) report_.path_constant = constant(report_.path_length_m, count, report_.painted_area_m2);
+    for (ComponentPath& component : report_.components)
+      if (component.dot_count > 1)
+        component.path_constant = constant(component.path_length_m, component.dot_count, component.painted_area_m2);
+  }
 
  private:
-  /// Mass along the curve where stratum k begins.
-  double begin_of(std::uint64_t k) const {
-    return k >= count_ ? mass_.total() : mass_.total() * (static_cast<double>(k) / static_cast<double>(count_));
-  }
-  std::uint64_t stratum_at(double mass) const {
-    auto k = static_cast<std::uint64_t>(std::clamp(mass / mass_.total(), 0., 1.) * static_cast<double>(count_));
-    k = std::min(k, count_ - 1);
-    while (k > 0 && begin_of(k) > mass) --k;
-    while (k + 1 < count_ && begin_of(k + 1) <= mass) ++k;
-    return k;
+  static double constant(double length, std::uint64_t count, double area) {
+    return area > 0 ? length / std::sqrt(static_cast<double>(count) * area) : 0;
   }
 
-  /// First base quad of a group: groups have about equal mass.
-  std::size_t group_begin(std::size_t group) const {
-    if (group == kGroupCount) return mass_.quads.size();
-    const double target = mass_.total() * static_cast<double>(group) / kGroupCount;
-    if (group == 0) return 0;
-    const auto at = std::lower_bound(mass_.mass_before.begin(), mass_.mass_before.end() - 1, target);
-    return static_cast<std::size_t>(at - mass_.mass_before.begin());
-  }
-
-  GroupResult place_group(std::size_t group) {
-    GroupResult result;
-    const std::size_t begin = group_begin(group), end = group_begin(group + 1);
-    if (begin >= end) return result;
-    Run run{*this, result, mass_.mass_before[begin]};
-    for (std::size_t i = begin; i < end; ++i) {
-      const double mass = mass_.mass_before[i + 1] - mass_.mass_before[i];
-      if (!(mass > 0)) continue;
-      run.at = mass_.mass_before[i];
-      run.quad_end = mass_.mass_before[i + 1];
-      const QuadIndex index = mass_.quads[i];
-      const Sheet& sheet = curve_.sheets[index.sheet];
-      walk_patches(sheet, index.sheet, sheet.base_quads[index.quad], tone_, rule_, mass,
-                   [&](const Patch& patch) { run.take(patch); });
-    }
-    run.finish(mass_.mass_before[end]);
-    return result;
-  }
-
-  /// The walk of one group: cuts the patches into strata, or finds the places of a sequence in them.
-  struct Run {
-    Placement& owner;
-    GroupResult& result;
-    double at;            ///< mass along the curve
-    double quad_end = 0;  ///< the patches of a base quad never reach beyond, whatever rounding says
-    std::uint64_t index = owner.first_index(at);
-    bool is_first = true;  ///< the stratum may have begun in the group before
-    Stratum stratum{};
-
-    void take(const Patch& patch) {
-      ++result.patch_count;
-      for (const ToneIntegral& integral : patch.integrals) result.painted_area_m2 += integral.area_m2;
-      const double end = std::min(at + patch.mass, quad_end);
-      if (owner.places_)
-        take_places(patch, end);
-      else
-        cut_strata(patch, end);
-      at = end;
-    }
-
-    void cut_strata(const Patch& patch, double end) {
-      double share = 0;
-      while (index + 1 < owner.count_ && owner.begin_of(index + 1) < end) {
-        const double next = std::clamp((owner.begin_of(index + 1) - at) / patch.mass, share, 1.);
-        add_stretch(stratum, owner.curve_.mesh, patch, share, next);
-        share = next;
-        close();
-      }
-      add_stretch(stratum, owner.curve_.mesh, patch, share, 1);
-    }
-
-    void close() {
-      if (is_first)
-        result.open_strata.emplace_back(index, std::move(stratum));
-      else
-        owner.put_centre(index, stratum);
-      is_first = false;
-      stratum.clear();
-      ++index;
-    }
-
-    void take_places(const Patch& patch, double end) {
-      for (; index < owner.count_ && owner.place_of(index) < end; ++index) {
-        const double share = std::clamp((owner.place_of(index) - at) / patch.mass, 0., 1.);
-        owner.put(index, point_at(owner.tone_, patch, share), patch.sheet);
-      }
-      last_point = point_in_heaviest(owner.tone_, patch);
-      last_sheet = patch.sheet;
-    }
-    SurfacePoint last_point{};
-    std::uint32_t last_sheet = 0;
-
-    void finish(double end) {
-      if (!owner.places_) {
-        result.open_strata.emplace_back(index, std::move(stratum));
-        return;
-      }
-      // Places in the last digits between the last patch and the next group.
-      for (; index < owner.count_ && owner.place_of(index) < end; ++index) owner.put(index, last_point, last_sheet);
-    }
-  };
-
-  double place_of(std::uint64_t index) const { return mass_.total() * places_->at(index); }
-
-  std::uint64_t first_index(double mass) const {
-    if (!places_) return stratum_at(mass);
-    std::uint64_t low = 0, high = count_;
-    while (low < high) {
-      const std::uint64_t middle = low + (high - low) / 2;
-      if (place_of(middle) < mass)
-        low = middle + 1;
-      else
-        high = middle;
-    }
-    return low;
-  }
-
-  void put(std::uint64_t index, const SurfacePoint& point, std::uint32_t sheet) {
-    dots_[index] = make_dot(curve_, tone_, point, curve_.sheets[sheet].component);
-  }
-  void put_centre(std::uint64_t index, const Stratum& stratum) {
-    CHECK(!stratum.is_empty());
-    put(index, centre_on_surface(curve_, tone_, stratum), stratum.heaviest().sheet);
-  }
-
-  void close_open_strata(std::vector<GroupResult>& results) {
-    Stratum stratum;
-    std::uint64_t index = 0;
-    for (GroupResult& result : results)
-      for (auto& [next_index, next] : result.open_strata) {
-        if (next_index != index && !stratum.is_empty()) {
-          put_centre(index, stratum);
-          stratum.clear();
-        }
-        index = next_index;
-        stratum.append(std::move(next));
-      }
-    if (!stratum.is_empty()) put_centre(index, stratum);
-  }
-
-  std::uint64_t placed_count() const {
-    return static_cast<std::uint64_t>(
-        std::ranges::count_if(dots_, [](const Dot& dot) { return !dot.normal_O.isZero(); }));
-  }
-
-  const SurfaceCurve::Implementation& curve_;
-  const ToneField& tone_;
-  const CurveMass& mass_;
-  std::uint64_t count_;
-  PatchRule rule_;
-  std::optional<Sequence> places_;
-  std::vector<Dot> dots_;
-  double painted_area_m2_ = 0;
+  const CurveMass::Implementation& mass_;
+  SampleReport& report_;
+  Eigen::Vector3d last_O_ = Eigen::Vector3d::Zero();
+  std::uint32_t last_component_ = 0;
+  bool has_last_ = false;
 };
 
-std::uint64_t count_of(const SampleOptions& options, double mass) {
+/// Makes blocks in parallel, a batch at a time; while the caller has one batch the next is made.
+class BlockStream {
+ public:
+  BlockStream(const DotPlan& plan)
+      : plan_(plan),
+        block_size_(std::clamp(plan.strata.count / kBlocksAtLeast, kLeastDotsInBlock, kMostDotsInBlock)),
+        block_count_((plan.strata.count + block_size_ - 1) / block_size_) {}
+
+  template <class Visit>
+  void run(Visit visit) {
+    std::vector<DotBlock> ready = make_batch(0), next;
+    for (std::uint64_t begin = 0; begin < block_count_; begin += kBlocksAtOnce) {
+      // Should the visitor throw, the batch under way is waited for.
+      struct Waiter {
+        tbb::task_group group;
+        ~Waiter() { group.wait(); }
+      } waiter;
+      if (begin + kBlocksAtOnce < block_count_) waiter.group.run([&] { next = make_batch(begin + kBlocksAtOnce); });
+      for (std::size_t i = 0; i < ready.size(); ++i)
+        visit(ready[i], std::min(plan_.strata.count, (begin + i + 1) * block_size_));
+      waiter.group.wait();
+      ready = std::move(next);
+    }
+  }
+
+ private:
+  std::vector<DotBlock> make_batch(std::uint64_t begin) const {
+    const std::uint64_t end = std::min(begin + kBlocksAtOnce, block_count_);
+    std::vector<DotBlock> blocks(end - begin);
+    tbb::parallel_for(
+        begin, end,
+        [&](std::uint64_t b) {
+          blocks[b - begin] = make_block(plan_, b * block_size_, std::min((b + 1) * block_size_, plan_.strata.count));
+        },
+        tbb::simple_partitioner());
+    return blocks;
+  }
+
+  const DotPlan& plan_;
+  std::uint64_t block_size_, block_count_;
+};
+
+}  // namespace
+
+std::uint64_t count_dots(const CurveMass& curve_mass, const SampleOptions& options) {
+  const double mass = curve_mass.total_m2();
   if (options.pitch_m.has_value() == options.dot_count.has_value())
     throw InputError("", "give either dpi or the number of dots, not both and not neither");
   if (!(mass > 0)) {
@@ -267,33 +142,45 @@ std::uint64_t count_of(const SampleOptions& options, double mass) {
   return static_cast<std::uint64_t>(count);
 }
 
-double path_length(const std::vector<Dot>& dots) {
-  double sum = 0;
-  for (std::size_t i = 1; i < dots.size(); ++i) sum += (dots[i].position_O - dots[i - 1].position_O).norm();
-  return sum;
+double pitch_of(const CurveMass& mass, const SampleOptions& options, std::uint64_t count) {
+  return options.pitch_m.value_or(std::sqrt(mass.total_m2() / static_cast<double>(count)));
 }
 
-}  // namespace
+void stream_dots(const CurveMass& mass, const SampleOptions& options, const DotVisitor& visit, SampleReport* report,
+                 const Progress& progress) {
+  CHECK(options.sampler != Sampler::kBlue);
+  const std::uint64_t count = count_dots(mass, options);
+  SampleReport figures;
+  PathMeter meter(mass.implementation(), figures);
+  if (count > 0) {
+    const DotPlan plan(mass.implementation(), options, count);
+    BlockStream(plan).run([&](const DotBlock& block, std::uint64_t done) {
+      meter.follow(block);
+      visit(block.dots);
+      if (progress) progress(static_cast<double>(done) / static_cast<double>(count));
+    });
+  }
+  meter.finish(count);
+  if (report) *report = std::move(figures);
+}
+
+DotSequence place_dots(const CurveMass& mass, const SampleOptions& options, SampleReport* report,
+                       const Progress& progress) {
+  DotSequence sequence;
+  const std::uint64_t count = count_dots(mass, options);
+  sequence.pitch_m = pitch_of(mass, options, count);
+  sequence.dots.reserve(count);
+  stream_dots(
+      mass, options,
+      [&](std::span<const Dot> dots) { sequence.dots.insert(sequence.dots.end(), dots.begin(), dots.end()); }, report,
+      progress);
+  return sequence;
+}
 
 DotSequence place_dots(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
                        SampleReport* report, const Progress& progress) {
-  CHECK(&curve.mesh() == &tone.mesh());
   if (options.sampler == Sampler::kBlue) return place_blue(curve, tone, options, report, progress);
-  const CurveMass mass = measure_curve(curve.implementation(), tone);
-  const std::uint64_t count = count_of(options, mass.total());
-  SampleReport figures;
-  DotSequence sequence;
-  sequence.pitch_m = options.pitch_m.value_or(std::sqrt(mass.total() / static_cast<double>(count)));
-  if (count == 0) {
-    if (report) *report = figures;
-    return sequence;
-  }
-  Placement placement(curve.implementation(), tone, options, mass, count);
-  sequence.dots = placement.place(figures, progress);
-  figures.path_length_m = path_length(sequence.dots);
-  figures.path_constant = figures.path_length_m / std::sqrt(static_cast<double>(count) * placement.painted_area_m2());
-  if (report) *report = figures;
-  return sequence;
+  return place_dots(CurveMass(curve, tone), options, report, progress);
 }
 
 }  // namespace hilbrush

@@ -39,6 +39,7 @@ struct SampleOptions {
   Sampler sampler = Sampler::kCentroid;
   std::uint64_t seed = 1;
   double omega = 4;                      ///< a quad is split while it may misplace more than 1/omega of a dot
+  std::optional<int> uniform_depth;      ///< or: until it has this depth, whatever it holds; for comparison
   std::uint64_t dot_limit = 50'000'000;  ///< more is an InputError that names dpi and size
 };
 

@@ -207,26 +207,37 @@ double ToneField::asked(const SurfacePoint& point) const {
                          texels.addressing);
 }
 
-ToneIntegral ToneField::integrate(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
+TriangleTone ToneField::on(std::uint32_t triangle) const {
+  TriangleTone result;
+  result.field_ = this;
+  result.triangle_ = triangle;
+  result.space_ = 2 * mesh_.area_vector(triangle).norm();
   const Source source = sources_[triangle];
-  if (source.kind != Source::kBlank) {
-    if (atlas_ || source.kind == Source::kTexture) return integrate_texture(triangle, polygon);
-    if (source.kind == Source::kColors) return integrate_colors(triangle, polygon);
+  if (source.kind == Source::kBlank) return result;
+  if (atlas_ || source.kind == Source::kTexture) {
+    const AskedTexels texels = asked_texels(triangle);
+    result.kind_ = TriangleTone::kTexels;
+    result.layer_ = &texels.tones;
+    result.addressing_ = texels.addressing;
+    result.origin_ = texels.corners[0];
+    result.e1_ = texels.corners[1] - texels.corners[0];
+    result.e2_ = texels.corners[2] - texels.corners[0];
+  } else if (source.kind == Source::kMean) {
+    result.tone_ = layers_[source.layer].tones.mean();
+  } else {
+    const auto& l = mesh_.corner_luminance[triangle];
+    if (l[0] == l[1] && l[1] == l[2])
+      result.tone_ = asked_for(coverage(l[0]) * mesh_.materials[mesh_.material_index[triangle]].opacity);
+    else
+      result.kind_ = TriangleTone::kColors;
   }
-  const double tone = source.kind == Source::kMean ? layers_[source.layer].tones.mean() : 0;
-  return integrate_linear(
-      polygon, [&](const Vector2d&) { return tone; }, 2 * mesh_.area_vector(triangle).norm());
+  return result;
 }
 
 ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
   const double scale = 2 * mesh_.area_vector(triangle).norm();
   const auto& l = mesh_.corner_luminance[triangle];
   const double opacity = mesh_.materials[mesh_.material_index[triangle]].opacity;
-  if (l[0] == l[1] && l[1] == l[2]) {
-    const double tone = asked_for(coverage(l[0]) * opacity);
-    return integrate_linear(
-        polygon, [&](const Vector2d&) { return tone; }, scale);
-  }
   const auto luminance = [&](const Vector2d& b) { return l[0] + b.x() * (l[1] - l[0]) + b.y() * (l[2] - l[0]); };
   const auto tone = [&](const Vector2d& b) { return asked_for(coverage(luminance(b)) * opacity); };
   // The tone bends where the coverage leaves 0 or 1 and at the curve's knots; between two bends it is linear.
@@ -243,32 +254,6 @@ ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const
     sum.square += integral.square;
   });
   return sum;
-}
-
-ToneIntegral ToneField::integrate_texture(std::uint32_t triangle, std::span<const Vector2d> polygon) const {
-  const AskedTexels asked = asked_texels(triangle);
-  const auto& p = asked.corners;
-  const Vector2d e1 = p[1] - p[0], e2 = p[2] - p[0];
-  std::array<Vector2d, kMostPolygonCorners> texels;
-  CHECK_LE(polygon.size(), texels.size());
-  double twice_area_b = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    texels[i] = p[0] + polygon[i].x() * e1 + polygon[i].y() * e2;
-    twice_area_b += cross(polygon[i] - polygon[0], polygon[(i + 1) % polygon.size()] - polygon[0]);
-  }
-  const double space = 2 * mesh_.area_vector(triangle).norm();
-  ToneIntegral result;
-  result.area_m2 = .5 * std::abs(twice_area_b) * space;
-  if (twice_area_b == 0) return result;
-  const TexelIntegral t = asked.tones.integrate({texels.data(), polygon.size()}, asked.addressing);
-  // From texels to space; the sign takes care of clockwise polygons and mirrored textures.
-  const double determinant = cross(e1, e2);
-  const double scale = (twice_area_b > 0 ? space : -space) / determinant;
-  const Vector2d first = t.first - t.mass * p[0];
-  result.mass = std::max(0., scale * t.mass);
-  result.first = scale / determinant * Vector2d(cross(first, e2), cross(e1, first));
-  result.square = std::max(0., scale * t.square);
-  return result;
 }
 
 }  // namespace hilbrush

@@ -8,20 +8,12 @@
 #include "sampling/textured_mesh.h"
 #include "sampling/tone.h"
 #include "sampling/tone/asked_atlas.h"
-#include "sampling/tone/tone_layer.h"
+#include "sampling/tone/triangle_tone.h"
 
 /// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is
 /// measured against) and as asked (after it: the density of dots). Bilinear between texels, linear between vertex
 /// colours.
 namespace hilbrush {
-
-/// Integrals of the asked coverage over a piece of a triangle, over its area in space.
-struct ToneIntegral {
-  double area_m2 = 0;
-  double mass = 0;                                  ///< m^2: asked coverage times area
-  Eigen::Vector2d first = Eigen::Vector2d::Zero();  ///< asked coverage times (barycentric 1, barycentric 2)
-  double square = 0;  ///< asked coverage squared, for the deviation of equations 7.3 and 7.4
-};
 
 class ToneField {
  public:
@@ -39,11 +31,16 @@ class ToneField {
   /// True if the triangle gets no dots whatever its uv: blank by `untextured`, or transparent.
   bool is_blank(std::uint32_t triangle) const;
 
-  /// Exact (but for rounding) integrals of asked() over a convex polygon within a triangle; its corners are given by
-  /// their second and third barycentric coordinates, in either sense of rotation. Thread-safe.
-  ToneIntegral integrate(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const;
+  /// The asked tone on one triangle, for many look-ups and integrals. Thread-safe.
+  TriangleTone on(std::uint32_t triangle) const;
+  /// on(triangle).integrate(polygon).
+  ToneIntegral integrate(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const {
+    return on(triangle).integrate(polygon);
+  }
 
  private:
+  friend class TriangleTone;  // for the integrals of colours
+
   /// What one triangle's tone comes from.
   struct Source {
     enum Kind : std::uint8_t { kBlank, kColors, kTexture, kMean } kind = kBlank;
@@ -64,7 +61,6 @@ class ToneField {
   double wanted_of_texture(const SurfacePoint& point) const;
 
   ToneIntegral integrate_colors(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const;
-  ToneIntegral integrate_texture(std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) const;
 
   /// A texture's asked tones, for one factor of luminance and opacity.
   struct Layer {

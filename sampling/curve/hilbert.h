@@ -17,10 +17,10 @@ struct HilbertQuad {
   std::uint8_t permutation = 0;  ///< A, B, C or D
 
   /// Place of the i-th child along the curve: column + kSide * row.
-  unsigned place(unsigned i) const { return kPlaces[permutation][i]; }
-  HilbertQuad child(unsigned i) const { return {kPermutations[permutation][i]}; }
+  constexpr unsigned place(unsigned i) const { return kPlaces[permutation][i]; }
+  constexpr HilbertQuad child(unsigned i) const { return {kPermutations[permutation][i]}; }
   /// How the curve runs in the square to the right of this one, if both are walked one after the other.
-  HilbertQuad next_square() const { return {kA}; }
+  constexpr HilbertQuad next_square() const { return {kA}; }
 
  private:
   enum Permutation : std::uint8_t { kA, kB, kC, kD };

@@ -1,56 +1,82 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
-#include <vector>
-
-#include "sampling/tone_field.h"
 
 /// Pieces of triangles: what a quad of the curve's tree cuts out of the surface.
 namespace hilbrush {
 
-/// A corner of a piece: its place where the tree divides (the unit square, z = 0; or space) and where it is in its
-/// triangle.
+/// A corner of a piece: its place where the tree divides (the unit square, or space) and where it is in its triangle.
+template <int kDimensions>
 struct PieceCorner {
-  Eigen::Vector3d place;
+  Eigen::Matrix<double, kDimensions, 1> place;
   Eigen::Vector2d b;  ///< second and third barycentric coordinate
 };
 
 /// A convex polygon within one mesh triangle.
+template <int kDimensions>
 struct Piece {
+  using Corner = PieceCorner<kDimensions>;
   static constexpr std::size_t kMostCorners = 12;  ///< a triangle cut by the six sides of a cube has nine
 
-  std::uint32_t triangle = 0;
   std::uint32_t corner_count = 0;
-  std::array<PieceCorner, kMostCorners> corners;
+  std::array<Corner, kMostCorners> corners;
 
   Piece() = default;
   ~Piece() = default;
-  /// Only the corners in use are copied: pieces are copied all the time and most have four.
+  /// Only the corners in use are copied: most pieces have four.
   Piece(const Piece& other) { *this = other; }
-  Piece& operator=(const Piece& other);
+  Piece& operator=(const Piece& other) {
+    corner_count = other.corner_count;
+    for (std::uint32_t i = 0; i < corner_count; ++i) corners[i] = other.corners[i];
+    return *this;
+  }
 
-  std::span<const PieceCorner> all() const { return {corners.data(), corner_count}; }
-  void add(const PieceCorner& corner);
+  std::span<const Corner> all() const { return {corners.data(), corner_count}; }
+
+  void add(const Corner& corner) {
+    // The cap is never met by a convex polygon; one that rounding has bent loses a corner on which nothing depends.
+    if (corner_count == kMostCorners) return;
+    if (corner_count > 0 && corners[corner_count - 1].b == corner.b) return;
+    corners[corner_count++] = corner;
+  }
+
+  /// In units of the triangle's own twice.
+  double area_b() const {
+    double twice = 0;
+    for (std::uint32_t i = 2; i < corner_count; ++i) {
+      const Eigen::Vector2d u = corners[i - 1].b - corners[0].b, v = corners[i].b - corners[0].b;
+      twice += u.x() * v.y() - u.y() * v.x();
+    }
+    return .5 * std::abs(twice);
+  }
 };
 
 /// Cuts a piece by the plane place[axis] = at. What lies on the plane belongs to the upper part. Both parts get the
 /// very same new corners, so that no area is lost or counted twice, however badly the places are rounded.
-void cut_piece(const Piece& piece, int axis, double at, Piece& lower, Piece& upper);
-
-/// Area in units of the triangle's own twice.
-double area_b(const Piece& piece);
-/// Area on the unit square.
-double area_on_square(const Piece& piece);
-
-/// integrate() of the piece.
-ToneIntegral integrate(const ToneField& tone, const Piece& piece);
-
-/// Cuts pieces into the children of a box (four in the plane, eight in space), by the place of the child: bit k is set
-/// in the upper half along axis k. Pieces without area go.
-template <unsigned kChildCount>
-std::array<std::vector<Piece>, kChildCount> cut_into_children(std::span<const Piece> pieces,
-                                                              const Eigen::Vector3d& middle);
+template <int kDimensions>
+void cut_piece(const Piece<kDimensions>& piece, int axis, double at, Piece<kDimensions>& lower,
+               Piece<kDimensions>& upper) {
+  lower.corner_count = upper.corner_count = 0;
+  if (piece.corner_count == 0) return;
+  const auto* p = &piece.corners[piece.corner_count - 1];
+  double dp = p->place[axis] - at;
+  for (std::uint32_t i = 0; i < piece.corner_count; ++i) {
+    const auto* q = &piece.corners[i];
+    const double dq = q->place[axis] - at;
+    if ((dp < 0) != (dq < 0)) {
+      const double f = dp / (dp - dq);
+      PieceCorner<kDimensions> crossing{p->place + f * (q->place - p->place), p->b + f * (q->b - p->b)};
+      crossing.place[axis] = at;
+      lower.add(crossing);
+      upper.add(crossing);
+    }
+    (dq < 0 ? lower : upper).add(*q);
+    p = q, dp = dq;
+  }
+}
 
 }  // namespace hilbrush

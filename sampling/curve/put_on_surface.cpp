@@ -1,8 +1,9 @@
 #include "sampling/curve/put_on_surface.h"
 
 #include <algorithm>
-#include <limits>
-#include <utility>
+#include <vector>
+
+#include "sampling/curve/quad_walk.h"
 
 namespace hilbrush {
 namespace {
@@ -10,8 +11,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kLongestWalk = 12;
-/// A place that asks for less than this share of what its stratum asks for is blank.
-constexpr double kBlankShare = 1e-3;
+constexpr int kMostHalvings = 40;
 
 /// Barycentric coordinates of the point of a triangle that is nearest to `p` (Ericson, Real-Time Collision
 /// Detection, 5.1.5).
@@ -32,91 +32,71 @@ Vector3d nearest_in(const Vector3d& a, const Vector3d& b, const Vector3d& c, con
   return {va / sum, vb / sum, vc / sum};
 }
 
-struct Nearest {
-  SurfacePoint point;
-  double distance2 = std::numeric_limits<double>::infinity();
-};
+}  // namespace
 
-Nearest nearest_on(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& target) {
-  Nearest nearest{{t, nearest_in(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2), target)}, 0};
+NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& target) {
+  NearestPoint nearest{{t, nearest_in(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2), target)}, 0};
   nearest.distance2 = (position(mesh, nearest.point) - target).squaredNorm();
   return nearest;
 }
 
-Nearest walk_on(const TexturedMesh& mesh, const Neighbours& neighbours, Nearest here, const Vector3d& target) {
+SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbours& neighbours, const SurfacePoint& start,
+                          const Vector3d& target) {
+  NearestPoint here = nearest_in_triangle(mesh, start.triangle, target);
   for (int step = 0; step < kLongestWalk; ++step) {
-    Nearest best = here;
+    NearestPoint best = here;
     for (int side = 0; side < 3; ++side) {
       // Only across a side on which the nearest point lies: the one opposite a corner without weight.
       if (here.point.barycentric[(side + 2) % 3] > 0) continue;
       const TriangleSide across = neighbours[here.point.triangle][static_cast<std::size_t>(side)];
       if (across == kNoSide) continue;
-      const Nearest there = nearest_on(mesh, across.triangle, target);
+      const NearestPoint there = nearest_in_triangle(mesh, across.triangle, target);
       if (there.distance2 < best.distance2 * (1 - 1e-12)) best = there;
     }
     if (best.point.triangle == here.point.triangle) break;
     here = best;
   }
-  return here;
+  return here.point;
 }
 
-}  // namespace
-
-SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbours& neighbours, const SurfacePoint& start,
-                          const Vector3d& target_O) {
-  return walk_on(mesh, neighbours, nearest_on(mesh, start.triangle, target_O), target_O).point;
-}
-
-SurfacePoint centre_on_surface(const SurfaceCurve::Implementation& curve, const ToneField& tone,
-                               const Stratum& stratum) {
-  const StratumPart& part = stratum.heaviest();
-  const auto heaviest = std::max_element(part.crumbs.begin(), part.crumbs.end(),
-                                         [](const Crumb& a, const Crumb& b) { return a.mass < b.mass; });
-  // A stratum in the plane of one triangle needs no search.
-  if (part.crumbs.size() == 1 && tone.asked(heaviest->centre) > 0) return heaviest->centre;
-
-  const Vector3d target = part.moment_O / part.mass;
-  Nearest nearest;
-  std::uint32_t last = kNoTriangle;
-  for (const Crumb& crumb : part.crumbs) {
-    if (std::exchange(last, crumb.centre.triangle) == crumb.centre.triangle) continue;
-    const Nearest candidate = nearest_on(curve.mesh, crumb.centre.triangle, target);
-    if (candidate.distance2 < nearest.distance2) nearest = candidate;
+SurfacePoint point_with_tone(const ToneField& field, std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) {
+  const TriangleTone tone = field.on(triangle);
+  Piece<2> piece;
+  for (const Eigen::Vector2d& b : polygon) piece.add({b, b});
+  const auto centre_of = [&](const ToneIntegral& integral) {
+    return Eigen::Vector2d(integral.mass > 0 ? integral.first / integral.mass : polygon[0]);
+  };
+  Eigen::Vector2d centre = centre_of(integrate(tone, piece));
+  for (int halving = 0; halving < kMostHalvings && !(tone.asked(centre) > 0); ++halving) {
+    Piece<2> lower, upper;
+    cut_piece(piece, halving % 2, centre[halving % 2], lower, upper);
+    const ToneIntegral of_lower = integrate(tone, lower), of_upper = integrate(tone, upper);
+    const bool is_lower = of_lower.mass > of_upper.mass;
+    const ToneIntegral& heavier = is_lower ? of_lower : of_upper;
+    if (!(heavier.mass > 0)) break;
+    piece = is_lower ? lower : upper;
+    centre = centre_of(heavier);
   }
-  nearest = walk_on(curve.mesh, curve.neighbours, nearest, target);
-  const double asked = tone.asked(nearest.point);
-  return asked > 0 && asked >= kBlankShare * tone.asked(heaviest->centre) ? nearest.point : heaviest->centre;
+  return {triangle, {1 - centre.sum(), centre.x(), centre.y()}};
 }
-
-namespace {
-
-/// A hair inside its triangle: a beam that is aimed at the very edge of an open surface may pass it by.
-SurfacePoint inset(const TexturedMesh& mesh, const SurfacePoint& point) {
-  constexpr double kInsetM = 2e-6, kMostShare = .1;
-  const double twice_area = 2 * mesh.area_vector(point.triangle).norm();
-  SurfacePoint inside = point;
-  for (int c = 0; c < 3; ++c) {
-    const double opposite =
-        (mesh.corner(point.triangle, (c + 1) % 3) - mesh.corner(point.triangle, (c + 2) % 3)).norm();
-    const double least = std::min(kMostShare, kInsetM * opposite / twice_area);
-    inside.barycentric[c] = std::max(inside.barycentric[c], least);
-  }
-  inside.barycentric /= inside.barycentric.sum();
-  return inside;
-}
-
-}  // namespace
 
 Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& place,
              std::uint32_t component) {
-  const SurfacePoint point = inset(curve.mesh, place);
+  const DotSurface& surface = curve.dot_surfaces[place.triangle];
+  // A beam that is aimed at the very edge of an open surface may pass it by.
+  SurfacePoint point = place;
+  for (int c = 0; c < 3; ++c)
+    point.barycentric[c] =
+        std::max(point.barycentric[c], static_cast<double>(surface.least_barycentric[static_cast<std::size_t>(c)]));
+  point.barycentric /= point.barycentric.sum();
   Dot dot;
   dot.position_O = position(curve.mesh, point);
-  dot.normal_O = face_normal(curve.mesh, point).cast<float>();
-  const auto& normals = curve.corner_normals[point.triangle];
+  dot.normal_O = surface.normal;
   Eigen::Vector3f smooth = Eigen::Vector3f::Zero();
-  for (int c = 0; c < 3; ++c) smooth += static_cast<float>(point.barycentric[c]) * normals[static_cast<std::size_t>(c)];
-  dot.smooth_normal_O = smooth.norm() > 1e-3f ? Eigen::Vector3f(smooth.normalized()) : dot.normal_O;
+  for (int c = 0; c < 3; ++c)
+    smooth += static_cast<float>(point.barycentric[c]) * surface.corner_normals[static_cast<std::size_t>(c)];
+  const float norm = smooth.norm();
+  dot.smooth_normal_O = norm > 1e-3f ? Eigen::Vector3f(smooth / norm) : dot.normal_O;
   dot.triangle = point.triangle;
   dot.component = component;
   dot.tone = static_cast<float>(tone.wanted(point));

@@ -1,20 +1,27 @@
 #pragma once
-#include "sampling/curve/strata.h"
+#include <span>
+
 #include "sampling/curve/surface_curve.h"
 
-/// From a stratum to its dot.
+/// Places on the surface, and the dots there.
 namespace hilbrush {
 
 /// The surface point nearest to `target_O` near `start`: a short walk from triangle to triangle.
 SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbours& neighbours, const SurfacePoint& start,
                           const Eigen::Vector3d& target_O);
 
-/// The stratum's centre of mass, put back on the surface; where that is blank, the centre of the stratum's heaviest
-/// crumb.
-SurfacePoint centre_on_surface(const SurfaceCurve::Implementation& curve, const ToneField& tone,
-                               const Stratum& stratum);
+/// The point of a triangle that is nearest to `target_O`, and how far that is, squared.
+struct NearestPoint {
+  SurfacePoint point;
+  double distance2 = 0;
+};
+NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& target_O);
 
-/// The dot at a surface point.
+/// A point of a polygon within a triangle that asks for dots, by halving it towards its mass; its corners by second and
+/// third barycentric coordinate. The polygon's middle if it has no mass.
+SurfacePoint point_with_tone(const ToneField& tone, std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon);
+
+/// The dot at a surface point, moved a hair inside its triangle.
 Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& point,
              std::uint32_t component);
 

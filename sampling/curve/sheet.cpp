@@ -1,157 +1,262 @@
 #include "sampling/curve/sheet.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace hilbrush {
 namespace {
+
+using Eigen::Vector2d;
 
 constexpr std::size_t kMostFaces = 8;
 /// A quad with no more than a small share of a mean triangle's area may hold as many: around a vertex with many
 /// triangles, and along needles, division would not end by itself.
 constexpr std::size_t kMostFacesIfSmall = 64;
 constexpr double kSmallShare = .25;
-/// The same holds where the children together would have this many times the triangles.
-constexpr double kTooManyInChildren = 1.9;
+/// No quad holds more than one part in so many of the mesh's area, however few its triangles: threads and strata find
+/// their way from base quads, and the walk to a place below one stays short.
+constexpr double kLeastQuads = 16384;
+/// Division also ends where it would multiply the listed triangles by more than this power of a quad's side: 1.9 with
+/// four children.
+constexpr double kTooManyExponent = .926;
 constexpr int kDeepest = 24;
 /// A sound map lists each face in a few quads.
-constexpr std::size_t kMostListed = 100'000, kMostListedPerFace = 60;
+constexpr std::size_t kMostListed = 1'000'000, kMostListedPerFace = 60;
 /// Chaining by nearest ends is quadratic.
 constexpr std::size_t kMostChained = 3000;
+/// Rounding may not lose a triangle that touches a quad.
+constexpr double kTouch = 1e-14;
 
-Piece whole(const SheetFace& face, std::uint32_t index) {
-  Piece piece;
-  piece.triangle = index;
-  for (const PieceCorner& corner : face.corners) piece.add(corner);
-  return piece;
+double cross(const Vector2d& a, const Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
 }
 
-/// While the base tree is built, Piece::triangle is the face's index.
-bool is_base_leaf(const Sheet& sheet, const TexturedMesh& mesh, double small_area, int depth,
-                  const std::vector<Piece>& pieces) {
-  if (pieces.size() <= kMostFaces || depth == kDeepest) return true;
-  if (pieces.size() > kMostFacesIfSmall) return false;
-  double area = 0;
-  for (const Piece& piece : pieces)
-    area += 2 * area_b(piece) * mesh.area_vector(sheet.faces[piece.triangle].triangle).norm();
-  return area < small_area;
-}
+/// Builds the base tree of one sheet for one kind of curve.
+template <class Curve>
+class TreeBuilder {
+ public:
+  static constexpr int kDimensions = kDimensionsOf<Curve>;
+  using Place = Eigen::Matrix<double, kDimensions, 1>;
 
-template <class Hilbert>
-void add_base_quad(Sheet& sheet, const Box& box, Hilbert hilbert, const std::vector<Piece>& pieces) {
-  BaseQuad quad;
-  quad.box = box;
-  quad.first_face = static_cast<std::uint32_t>(sheet.face_lists.size());
-  quad.face_count = static_cast<std::uint32_t>(pieces.size());
-  if constexpr (Hilbert::kChildCount == 4)
-    quad.quad = hilbert;
-  else
-    quad.cube = hilbert;
-  for (const Piece& piece : pieces) sheet.face_lists.push_back(piece.triangle);
-  sheet.base_quads.push_back(quad);
-}
-
-bool is_out_of_bounds(const Sheet& sheet) {
-  return sheet.face_lists.size() > kMostListed + kMostListedPerFace * sheet.faces.size();
-}
-
-template <class Hilbert>
-void divide(Sheet& sheet, const TexturedMesh& mesh, double small_area, const Box& box, Hilbert hilbert, int depth,
-            std::vector<Piece>& pieces) {
-  if (pieces.empty()) return;
-  const bool is_too_much = is_out_of_bounds(sheet);
-  if (is_too_much && Hilbert::kChildCount == 4) return;
-  if (is_too_much || is_base_leaf(sheet, mesh, small_area, depth, pieces))
-    return add_base_quad(sheet, box, hilbert, pieces);
-  auto children = cut_into_children<Hilbert::kChildCount>(pieces, box.middle());
-  std::size_t count = 0;
-  for (const auto& child : children) count += child.size();
-  if (pieces.size() <= kMostFacesIfSmall &&
-      static_cast<double>(count) > kTooManyInChildren * static_cast<double>(pieces.size()))
-    return add_base_quad(sheet, box, hilbert, pieces);
-  std::vector<Piece>().swap(pieces);
-  for (unsigned i = 0; i < Hilbert::kChildCount; ++i) {
-    const unsigned place = hilbert.place(i);
-    divide(sheet, mesh, small_area, box.child(place), hilbert.child(i), depth + 1, children[place]);
-  }
-}
-
-Box bounding_cube(const Sheet& sheet) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
-  for (const SheetFace& face : sheet.faces)
-    for (const PieceCorner& corner : face.corners) {
-      low = low.cwiseMin(corner.place);
-      high = high.cwiseMax(corner.place);
+  TreeBuilder(Sheet& sheet, const TexturedMesh& mesh)
+      : sheet_(sheet), mesh_(mesh), too_many_(std::pow(Curve::kSide, kTooManyExponent)) {
+    double area = 0;
+    faces_.reserve(sheet.faces.size());
+    for (const SheetFace& face : sheet.faces) {
+      faces_.push_back(measure(face));
+      area += faces_.back().area;
     }
-  const double size = (high - low).maxCoeff() * (1 + 1e-9);
-  return {.5 * (low + high) - Eigen::Vector3d::Constant(size / 2), size};
-}
+    small_area_ = kSmallShare * area / static_cast<double>(std::max<std::size_t>(1, faces_.size()));
+    large_area_ = mesh.area_m2() / kLeastQuads;
+    for (auto& level : levels_) level.resize(Curve::kChildCount);
+  }
 
+  void build() {
+    std::vector<std::uint32_t> all(faces_.size());
+    for (std::uint32_t f = 0; f < all.size(); ++f) all[f] = f;
+    if constexpr (kDimensions == 3) {
+      Place low = Place::Constant(std::numeric_limits<double>::infinity()), high = -low;
+      for (const Face& face : faces_) low = low.cwiseMin(face.low), high = high.cwiseMax(face.high);
+      const double size = (high - low).maxCoeff() * (1 + 1e-9);
+      divide(.5 * (low + high) - Place::Constant(size / 2), size, Curve{}, 0, all);
+    } else {
+      Curve curve{};
+      std::vector<std::uint32_t> here;
+      for (int i = 0; i < sheet_.square_count; ++i, curve = curve.next_square()) {
+        here.clear();
+        const Place low(i, 0);
+        for (const auto f : all)
+          if (sheet_.square_count == 1 || overlaps(faces_[f], f, low, 1)) here.push_back(f);
+        divide(low, 1, curve, 0, here);
+      }
+    }
+  }
+
+ private:
+  struct Face {
+    Place low, high;     ///< bounds
+    double area = 0;     ///< m^2
+    double density = 0;  ///< m^2 for a unit of the square
+  };
+
+  Face measure(const SheetFace& face) const {
+    const auto piece = whole_piece<kDimensions>(sheet_, mesh_, face);
+    Face result;
+    result.low = result.high = piece.corners[0].place;
+    for (std::size_t c = 1; c < 3; ++c) {
+      result.low = result.low.cwiseMin(piece.corners[c].place);
+      result.high = result.high.cwiseMax(piece.corners[c].place);
+    }
+    result.area = 2 * piece.area_b() * mesh_.area_vector(face.triangle).norm();
+    if constexpr (kDimensions == 2)
+      result.density =
+          result.area / (.5 * std::abs(cross(face.places[1] - face.places[0], face.places[2] - face.places[0])));
+    return result;
+  }
+
+  bool overlaps(const Face& face, std::uint32_t f, const Place& low, double size) const {
+    for (int k = 0; k < kDimensions; ++k)
+      if (face.high[k] < low[k] || face.low[k] > low[k] + size) return false;
+    if constexpr (kDimensions == 3) {
+      auto piece = whole_piece<3>(sheet_, mesh_, sheet_.faces[f]);
+      clip_to_box<3>(piece, low, size);
+      return piece.corner_count >= 3;
+    } else {
+      // Beyond one of the three sides?
+      const auto& p = sheet_.faces[f].places;
+      const double turn = cross(p[1] - p[0], p[2] - p[0]) < 0 ? -1 : 1;
+      const Vector2d middle = low + Vector2d::Constant(size / 2);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vector2d side = p[(k + 1) % 3] - p[k];
+        const double reach = (.5 * size + kTouch) * (std::abs(side.x()) + std::abs(side.y()));
+        if (turn * cross(side, middle - p[k]) + reach < 0) return false;
+      }
+      return true;
+    }
+  }
+
+  /// No less than what the box holds.
+  double area_bound(const std::vector<std::uint32_t>& list, double size) const {
+    double area = 0, density = 0;
+    for (const auto f : list) {
+      area += faces_[f].area;
+      density = std::max(density, faces_[f].density);
+    }
+    return kDimensions == 2 ? std::min(area, density * size * size) : area;
+  }
+
+  bool is_leaf(const std::vector<std::uint32_t>& list, double size, int depth) const {
+    if (depth == kDeepest) return true;
+    if (list.size() > kMostFacesIfSmall) return false;
+    return area_bound(list, size) <= (list.size() <= kMostFaces ? large_area_ : std::min(small_area_, large_area_));
+  }
+
+  bool is_out_of_bounds() const {
+    return sheet_.face_lists.size() > kMostListed + kMostListedPerFace * sheet_.faces.size();
+  }
+
+  void add_leaf(const Place& low, double size, Curve curve, int depth, const std::vector<std::uint32_t>& list) {
+    BaseQuad quad;
+    quad.low.template head<kDimensions>() = low;
+    quad.size = size;
+    quad.first_face = static_cast<std::uint32_t>(sheet_.face_lists.size());
+    quad.face_count = static_cast<std::uint32_t>(list.size());
+    quad.depth = static_cast<std::uint8_t>(depth);
+    if constexpr (kDimensions == 3) {
+      quad.permutation = curve.entry;
+      quad.cube_direction = curve.direction;
+    } else {
+      quad.permutation = curve.permutation;
+    }
+    sheet_.face_lists.insert(sheet_.face_lists.end(), list.begin(), list.end());
+    sheet_.base_quads.push_back(quad);
+  }
+
+  static Place child_low(const Place& low, double size, unsigned place) {
+    Place result = low;
+    for (int k = 0; k < kDimensions; ++k, place /= Curve::kSide) result[k] += size * (place % Curve::kSide);
+    return result;
+  }
+
+  void divide(const Place& low, double size, Curve curve, int depth, const std::vector<std::uint32_t>& list) {
+    if (list.empty()) return;
+    const bool is_too_much = is_out_of_bounds();
+    if (is_too_much && kDimensions == 2) return;
+    if (is_too_much || is_leaf(list, size, depth)) return add_leaf(low, size, curve, depth, list);
+    auto& children = levels_[static_cast<std::size_t>(depth)];
+    const double child_size = size / Curve::kSide;
+    std::size_t count = 0;
+    for (unsigned place = 0; place < Curve::kChildCount; ++place) {
+      children[place].clear();
+      const Place at = child_low(low, child_size, place);
+      for (const auto f : list)
+        if (overlaps(faces_[f], f, at, child_size)) children[place].push_back(f);
+      count += children[place].size();
+    }
+    if (list.size() > kMostFaces && list.size() <= kMostFacesIfSmall &&
+        static_cast<double>(count) > too_many_ * static_cast<double>(list.size()) &&
+        area_bound(list, size) <= large_area_)
+      return add_leaf(low, size, curve, depth, list);
+    for (unsigned i = 0; i < Curve::kChildCount; ++i) {
+      const unsigned place = curve.place(i);
+      divide(child_low(low, child_size, place), child_size, curve.child(i), depth + 1, children[place]);
+    }
+  }
+
+  Sheet& sheet_;
+  const TexturedMesh& mesh_;
+  std::vector<Face> faces_;
+  double small_area_ = 0, large_area_ = 0;
+  double too_many_;
+  std::array<std::vector<std::vector<std::uint32_t>>, kDeepest + 1> levels_;  ///< lists of the children on the way down
+};
+
+template <class Curve>
 Eigen::Vector3d position_of_first_piece(const Sheet& sheet, const BaseQuad& quad, const TexturedMesh& mesh) {
-  std::vector<Piece> pieces;
-  sheet.pieces_of(quad, pieces);
-  if (pieces.empty()) return Eigen::Vector3d::Zero();
-  const Eigen::Vector2d b = pieces[0].corners[0].b;
-  return position(mesh, {pieces[0].triangle, {1 - b.x() - b.y(), b.x(), b.y()}});
+  constexpr int kDimensions = kDimensionsOf<Curve>;
+  for (std::uint32_t i = 0; i < quad.face_count; ++i) {
+    const SheetFace& face = sheet.face_of(quad, i);
+    auto piece = whole_piece<kDimensions>(sheet, mesh, face);
+    clip_to_box<kDimensions>(piece, quad.low.template head<kDimensions>(), quad.size);
+    if (piece.corner_count < 3) continue;
+    const Vector2d b = piece.corners[0].b;
+    return position(mesh, {face.triangle, {1 - b.x() - b.y(), b.x(), b.y()}});
+  }
+  return mesh.corner(sheet.face_of(quad, 0).triangle, 0);
 }
 
 }  // namespace
 
-Box Box::child(unsigned place) const {
-  Box result{low, size / 2};
-  for (int k = 0; k < 3; ++k)
-    if (place >> k & 1u) result.low[k] += size / 2;
-  return result;
+template <int kDimensions>
+Piece<kDimensions> whole_piece(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face) {
+  const auto b = sheet.corners_b(face);
+  Piece<kDimensions> piece;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if constexpr (kDimensions == 3)
+      piece.add({position(mesh, {face.triangle, {1 - b[c].sum(), b[c].x(), b[c].y()}}), b[c]});
+    else
+      piece.add({face.places[c], b[c]});
+  }
+  return piece;
 }
+template Piece<2> whole_piece<2>(const Sheet&, const TexturedMesh&, const SheetFace&);
+template Piece<3> whole_piece<3>(const Sheet&, const TexturedMesh&, const SheetFace&);
 
-void Sheet::pieces_of(const BaseQuad& quad, std::vector<Piece>& pieces) const {
-  pieces.clear();
-  const int dimensions = is_on_square ? 2 : 3;
-  for (std::uint32_t i = 0; i < quad.face_count; ++i) {
-    const SheetFace& face = faces[face_lists[quad.first_face + i]];
-    Piece inside = whole(face, face.triangle), outside, kept;
-    for (int axis = 0; axis < dimensions; ++axis) {
-      cut_piece(inside, axis, quad.box.low[axis], outside, kept);
-      cut_piece(kept, axis, quad.box.low[axis] + quad.box.size, inside, outside);
+template <int kDimensions>
+void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size) {
+  Piece<kDimensions> below, above;
+  for (int axis = 0; axis < kDimensions; ++axis) {
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const auto& corner : piece.all()) {
+      least = std::min(least, corner.place[axis]);
+      most = std::max(most, corner.place[axis]);
     }
-    if (inside.corner_count >= 3 && area_b(inside) > 0) pieces.push_back(inside);
+    const double high = low[axis] + size;
+    if (most < low[axis] || least > high) piece.corner_count = 0;
+    if (least < low[axis]) {
+      cut_piece(piece, axis, low[axis], below, above);
+      piece = above;
+    }
+    if (most > high) {
+      cut_piece(piece, axis, high, below, above);
+      piece = below;
+    }
   }
 }
+template void clip_to_box<2>(Piece<2>&, const Eigen::Vector2d&, double);
+template void clip_to_box<3>(Piece<3>&, const Eigen::Vector3d&, double);
 
 bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh) {
-  std::vector<Piece> pieces;
-  pieces.reserve(sheet.faces.size());
-  double area = 0;
-  for (std::uint32_t f = 0; f < sheet.faces.size(); ++f) {
-    pieces.push_back(whole(sheet.faces[f], f));
-    area += 2 * area_b(pieces.back()) * mesh.area_vector(sheet.faces[f].triangle).norm();
-  }
-  const double small_area = kSmallShare * area / static_cast<double>(std::max<std::size_t>(1, pieces.size()));
-  if (!sheet.is_on_square) {
-    divide(sheet, mesh, small_area, bounding_cube(sheet), HilbertCube{}, 0, pieces);
-  } else {
-    for (int i = 1; i <= sheet.square_count; ++i) {
-      std::vector<Piece> rest, here;
-      Piece left, right;
-      for (const Piece& piece : pieces) {
-        if (i == sheet.square_count) {
-          here.push_back(piece);
-          continue;
-        }
-        cut_piece(piece, 0, i, left, right);
-        if (left.corner_count >= 3 && area_b(left) > 0) here.push_back(left);
-        if (right.corner_count >= 3 && area_b(right) > 0) rest.push_back(right);
-      }
-      const Box square{Eigen::Vector3d(i - 1, 0, 0), 1};
-      divide(sheet, mesh, small_area, square, HilbertQuad{}, 0, here);
-      pieces = std::move(rest);
-    }
-  }
-  if (sheet.is_on_square && is_out_of_bounds(sheet)) return false;
-  if (sheet.base_quads.empty()) return true;
-  sheet.begin_O = position_of_first_piece(sheet, sheet.base_quads.front(), mesh);
-  sheet.end_O = position_of_first_piece(sheet, sheet.base_quads.back(), mesh);
-  return true;
+  return with_curve(sheet.kind, [&]<class Curve>(Curve) {
+    TreeBuilder<Curve>(sheet, mesh).build();
+    if (kDimensionsOf<Curve> == 2 && sheet.face_lists.size() > kMostListed + kMostListedPerFace * sheet.faces.size())
+      return false;
+    if (sheet.base_quads.empty()) return true;
+    sheet.begin_O = position_of_first_piece<Curve>(sheet, sheet.base_quads.front(), mesh);
+    sheet.end_O = position_of_first_piece<Curve>(sheet, sheet.base_quads.back(), mesh);
+    return true;
+  });
 }
 
 std::vector<std::uint32_t> chain_sheets(const std::vector<Sheet>& sheets) {

@@ -1,50 +1,93 @@
 #pragma once
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "sampling/curve/hilbert.h"
+#include "sampling/curve/peano.h"
 #include "sampling/curve/piece.h"
-#include "sampling/progress.h"
+#include "sampling/textured_mesh.h"
 
-/// A sheet is a stretch of the surface that one Hilbert curve walks: a component on the unit square, or a component in
-/// space. Its base tree is divided until a quad (in space: a cube) holds few triangles; everything finer is made anew
-/// on each walk and not kept.
+/// A sheet is a stretch of the surface that one curve walks: a component on the unit square, or a component in space.
+/// Its base tree is divided until a quad (in space: a cube) holds few triangles and little area; everything finer is
+/// made anew on each walk and not kept.
 namespace hilbrush {
 
-/// A quad or a cube of the tree.
-struct Box {
-  Eigen::Vector3d low = Eigen::Vector3d::Zero();
-  double size = 1;
+/// What the curve of a sheet fills: the square, or a row of squares, or a cube.
+enum class SheetKind : std::uint8_t { kHilbertSquare, kPeanoSquare, kHilbertCube };
 
-  Eigen::Vector3d middle() const { return low + Eigen::Vector3d::Constant(size / 2); }
-  Box child(unsigned place) const;
-};
+template <class Curve>
+inline constexpr int kDimensionsOf = Curve::kChildCount == 8 ? 3 : 2;
 
 /// A leaf of the base tree.
 struct BaseQuad {
-  Box box;
-  HilbertQuad quad;                              ///< how the curve runs in it, on the square ...
-  HilbertCube cube;                              ///< ... or in space
-  std::uint32_t first_face = 0, face_count = 0;  ///< in Sheet::face_lists
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< z = 0 on the square
+  double size = 1;
+  std::uint32_t first_face = 0, face_count = 0;      ///< in Sheet::face_lists
+  std::uint8_t permutation = 0, cube_direction = 0;  ///< how the curve runs in it: curve_of()
+  std::uint8_t depth = 0;
 };
 
+template <class Curve>
+Curve curve_of(const BaseQuad& quad) {
+  if constexpr (kDimensionsOf<Curve> == 3)
+    return Curve(quad.permutation, quad.cube_direction);
+  else
+    return Curve(quad.permutation);
+}
+
+/// A mesh triangle on the square, or the part of one that the map's splits have left.
 struct SheetFace {
+  static constexpr std::uint32_t kWhole = ~std::uint32_t{0};
   std::uint32_t triangle = 0;
-  std::array<PieceCorner, 3> corners;
+  std::uint32_t part = kWhole;  ///< else an index into Sheet::parts
+  /// On the square; not used in space.
+  std::array<Eigen::Vector2d, 3> places{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
 };
 
 struct Sheet {
   std::uint32_t component = 0;
-  bool is_on_square = false;
-  int square_count = 1;  ///< squares in a row, each walked from its lower left to its lower right corner
+  SheetKind kind = SheetKind::kHilbertSquare;
+  int square_count = 1;  ///< squares in a row, each walked so that the next one begins where it ends
   std::vector<SheetFace> faces;
+  std::vector<std::array<Eigen::Vector2d, 3>> parts;  ///< corners by second and third barycentric coordinate
   std::vector<std::uint32_t> face_lists;
   std::vector<BaseQuad> base_quads;  ///< in order of the curve; empty ones are left out
   Eigen::Vector3d begin_O = Eigen::Vector3d::Zero(),
                   end_O = Eigen::Vector3d::Zero();  ///< where the curve starts and ends
 
-  /// The faces of a base quad, cut to its box.
-  void pieces_of(const BaseQuad& quad, std::vector<Piece>& pieces) const;
+  const SheetFace& face_of(const BaseQuad& quad, std::uint32_t i) const {
+    return faces[face_lists[quad.first_face + i]];
+  }
+  /// A face's corners by second and third barycentric coordinate.
+  std::array<Eigen::Vector2d, 3> corners_b(const SheetFace& face) const {
+    if (face.part != SheetFace::kWhole) return parts[face.part];
+    return {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
+  }
 };
+
+/// Calls `visit` with the sheet's kind of curve.
+template <class Visit>
+decltype(auto) with_curve(SheetKind kind, Visit visit) {
+  switch (kind) {
+    case SheetKind::kPeanoSquare:
+      return visit(PeanoQuad{});
+    case SheetKind::kHilbertCube:
+      return visit(HilbertCube{});
+    case SheetKind::kHilbertSquare:
+      break;
+  }
+  return visit(HilbertQuad{});
+}
+
+/// A face as a piece, with its places on the square (2) or in space (3).
+template <int kDimensions>
+Piece<kDimensions> whole_piece(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face);
+
+/// Cuts a piece to a box; what is left may be empty.
+template <int kDimensions>
+void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size);
 
 /// Fills in the base tree of a sheet whose faces are there. Cost O(faces log faces). On the square it gives up and
 /// returns false if the map is so sheared that the quads would hold each triangle many times.

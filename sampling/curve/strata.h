@@ -1,50 +1,210 @@
 #pragma once
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <tuple>
 #include <vector>
 
-#include "sampling/curve/patch_walk.h"
+#include "sampling/curve/quad_walk.h"
+#include "sampling/curve/sequence.h"
 
-/// Stretches of the curve that hold the mass of one dot, and where in a patch a share of its mass ends.
+/// Sinks of the walk: one cuts the curve's mass into strata, one finds places along it. Both work on a block of dots
+/// and know nothing of what comes before or after it, so that blocks may be made in any order.
 namespace hilbrush {
 
-/// A small bit of surface: its centre of mass and what it weighs.
-struct Crumb {
-  SurfacePoint centre;
-  double mass = 0;
+/// Equal stretches of the whole curve's mass, one for each dot.
+struct Strata {
+  double total = 0;
+  std::uint64_t count = 0;
+
+  double begin_of(std::uint64_t k) const {
+    return k >= count ? total : total * (static_cast<double>(k) / static_cast<double>(count));
+  }
 };
 
-/// The share of a stratum on one sheet.
-struct StratumPart {
-  std::uint32_t sheet = 0;
-  double mass = 0;
-  Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times place
-  std::vector<Crumb> crumbs;
+/// What dots are to be placed: the same for all blocks.
+struct DotPlan {
+  DotPlan(const CurveMass::Implementation& mass, const SampleOptions& options, std::uint64_t count);
+
+  const CurveMass::Implementation& mass;
+  Strata strata;
+  PatchRule rule;
+  std::optional<Sequence> sequence;  ///< where along the curve; nothing: at the centres of strata
 };
 
-struct Stratum {
-  std::vector<StratumPart> parts;
+/// Cuts strata `first` to `last` - 1 out of patches, and tells `consumer`:
+///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as shares of
+///                                                        its mass
+///   void close(std::uint64_t index)                      it is complete
+template <class Consumer>
+class StrataCutter {
+ public:
+  StrataCutter(const Strata& strata, std::uint64_t first, std::uint64_t last, Consumer& consumer)
+      : strata_(strata),
+        consumer_(consumer),
+        index_(first),
+        last_(last),
+        is_open_(first == 0),
+        next_(strata.begin_of(is_open_ ? 1 : first)) {
+    if (is_open_ && strata.count == 1) next_ = std::numeric_limits<double>::infinity();
+  }
 
-  void clear() { parts.clear(); }
-  bool is_empty() const { return parts.empty(); }
-  /// The part with most mass: a stratum that spans two sheets puts its dot on one of them.
-  const StratumPart& heaviest() const;
-  /// Takes in what lies after it on the curve.
-  void append(Stratum&& next);
+  bool is_done() const { return index_ == last_; }
+  /// Something of a stratum begins or ends here.
+  bool wants(double, double end) const { return next_ < end && !is_done(); }
+  /// Lies before the first stratum.
+  bool is_skipped() const { return !is_open_; }
+
+  template <class Walk, class Node>
+  void take(const Walk& walk, const Node& node, PatchKind kind) {
+    const double end = node.at + node.mass;
+    double share = 0;
+    while (next_ < end && !is_done()) {
+      const double next = std::clamp((next_ - node.at) / node.mass, share, 1.);
+      if (is_open_) consumer_.add(walk, node, kind, share, next);
+      share = next;
+      pass();
+    }
+    if (is_open_ && !is_done()) consumer_.add(walk, node, kind, share, 1.);
+  }
+
+  /// The curve is over: what rounding has left open ends here.
+  void finish() {
+    while (!is_done()) pass();
+  }
+
+ private:
+  void pass() {
+    if (is_open_) consumer_.close(index_++);
+    is_open_ = true;
+    next_ = index_ + 1 < strata_.count ? strata_.begin_of(index_ + 1) : std::numeric_limits<double>::infinity();
+  }
+
+  const Strata& strata_;
+  Consumer& consumer_;
+  std::uint64_t index_, last_;
+  bool is_open_;  ///< the curve has reached the beginning of stratum index_
+  double next_;   ///< where the current stratum ends, or the first one begins
 };
 
-/// Adds the stretch of a patch between two shares of its mass, 0 <= from <= to <= 1.
-void add_stretch(Stratum& stratum, const TexturedMesh& mesh, const Patch& patch, double from, double to);
+/// Finds numbers `first` to `last` - 1 of a sequence along the curve, and tells `consumer`:
+///   void put(walk, node, kind, double share, std::uint64_t index)   where in a patch
+template <class Consumer>
+class PlaceFinder {
+ public:
+  PlaceFinder(const Sequence& sequence, double total, std::uint64_t first, std::uint64_t last, Consumer& consumer)
+      : sequence_(sequence), total_(total), consumer_(consumer), index_(first), last_(last) {
+    next_ = place_of(first);
+  }
 
-/// The surface point where the curve has passed `share` of the patch's mass, or, where that is blank, one nearby that
-/// is not.
-SurfacePoint point_at(const ToneField& tone, const Patch& patch, double share);
+  bool is_done() const { return index_ == last_; }
+  std::uint64_t index() const { return index_; }
+  bool wants(double, double end) const { return next_ < end && !is_done(); }
+  bool is_skipped() const { return false; }
 
-/// A point of the piece that asks for dots, by halving it towards its mass.
-SurfacePoint point_with_tone(const ToneField& tone, Piece piece);
+  template <class Walk, class Node>
+  void take(const Walk& walk, const Node& node, PatchKind kind) {
+    while (wants(node.at, node.at + node.mass)) {
+      consumer_.put(walk, node, kind, std::clamp((next_ - node.at) / node.mass, 0., 1.), index_);
+      next_ = place_of(++index_);
+    }
+  }
 
-/// A point with tone in the patch's heaviest piece.
-SurfacePoint point_in_heaviest(const ToneField& tone, const Patch& patch);
+ private:
+  double place_of(std::uint64_t index) const { return index < last_ ? total_ * sequence_.at(index) : total_; }
 
-/// Integral of the Hilbert curve's place over its first `share`, in a unit square (z = 0).
-Eigen::Vector3d hilbert_moment(HilbertQuad quad, double share);
+  const Sequence& sequence_;
+  double total_;
+  Consumer& consumer_;
+  std::uint64_t index_, last_;
+  double next_;
+};
+
+/// Hands the cutter (or finder) what it asks for, and counts patches.
+template <class Cutter>
+class CountingSink {
+ public:
+  CountingSink(Cutter& cutter, std::vector<std::size_t>& patches_at_depth)
+      : cutter_(cutter), patches_at_depth_(patches_at_depth) {}
+
+  bool wants(double begin, double end) const { return cutter_.wants(begin, end); }
+
+  template <class Walk, class Node>
+  void take(const Walk& walk, const Node& node, PatchKind kind) {
+    cutter_.take(walk, node, kind);
+    if (!cutter_.is_skipped() && !cutter_.is_done()) count(static_cast<std::size_t>(node.depth));
+  }
+  void count(std::size_t depth) {
+    if (patches_at_depth_.size() <= depth) patches_at_depth_.resize(depth + 1);
+    ++patches_at_depth_[depth];
+  }
+
+ private:
+  Cutter& cutter_;
+  std::vector<std::size_t>& patches_at_depth_;
+};
+
+/// One walk for each kind of curve, made when it is needed.
+class Walks {
+ public:
+  explicit Walks(const DotPlan& plan) : plan_(plan) {}
+
+  template <class Sink>
+  void walk(std::size_t quad, Sink& sink) {
+    with_curve(plan_.mass.sheet_of(plan_.mass.quads[quad]).kind, [&]<class Curve>(Curve) {
+      auto& walk = std::get<std::optional<QuadWalk<Curve>>>(walks_);
+      if (!walk) walk.emplace(plan_.mass, plan_.rule);
+      walk->walk(quad, sink);
+    });
+  }
+
+ private:
+  const DotPlan& plan_;
+  std::tuple<std::optional<QuadWalk<HilbertQuad>>, std::optional<QuadWalk<PeanoQuad>>,
+             std::optional<QuadWalk<HilbertCube>>>
+      walks_;
+};
+
+/// Strata `first` to `last` - 1, told to `consumer` as StrataCutter does, and whole base quads by
+///   void add_quad(std::size_t quad)
+template <class Consumer>
+void cut_strata(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Consumer& consumer,
+                std::vector<std::size_t>& patches_at_depth) {
+  const CurveMass::Implementation& mass = plan.mass;
+  StrataCutter cutter(plan.strata, first, last, consumer);
+  CountingSink sink(cutter, patches_at_depth);
+  Walks walks(plan);
+  for (std::size_t q = mass.quad_at(plan.strata.begin_of(first)); q < mass.quads.size() && !cutter.is_done(); ++q) {
+    if (!(mass.mass_of(q) > 0)) continue;
+    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before[q], mass.mass_before[q + 1])) {
+      walks.walk(q, sink);
+    } else if (!cutter.is_skipped()) {
+      consumer.add_quad(q);
+      sink.count(mass.base_quad(mass.quads[q]).depth);
+    }
+  }
+  cutter.finish();
+}
+
+/// Numbers `first` to `last` - 1 of the plan's sequence, told to `consumer` as PlaceFinder does, and what rounding has
+/// left beyond the last quad by
+///   void put_in_quad(std::size_t quad)
+template <class Consumer>
+void find_places(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Consumer& consumer,
+                 std::vector<std::size_t>& patches_at_depth) {
+  const CurveMass::Implementation& mass = plan.mass;
+  PlaceFinder finder(*plan.sequence, mass.total(), first, last, consumer);
+  CountingSink sink(finder, patches_at_depth);
+  Walks walks(plan);
+  std::size_t last_quad = 0;
+  for (std::size_t q = mass.quad_at(mass.total() * plan.sequence->at(first)); q < mass.quads.size(); ++q) {
+    if (finder.is_done()) return;
+    if (!(mass.mass_of(q) > 0)) continue;
+    last_quad = q;
+    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before[q], mass.mass_before[q + 1])) walks.walk(q, sink);
+  }
+  for (std::uint64_t i = finder.index(); i < last; ++i) consumer.put_in_quad(last_quad);
+}
 
 }  // namespace hilbrush

@@ -9,6 +9,13 @@
 /// What SurfaceCurve keeps of a mesh: sheets with their base trees, and what a dot needs to know of its surroundings.
 namespace hilbrush {
 
+/// What a dot takes from its triangle.
+struct DotSurface {
+  Eigen::Vector3f normal;                         ///< unit
+  std::array<Eigen::Vector3f, 3> corner_normals;  ///< unit, over smooth edges
+  std::array<float, 3> least_barycentric;         ///< of a point that is a hair inside
+};
+
 struct SurfaceCurve::Implementation {
   explicit Implementation(const TexturedMesh& m) : mesh(m) {}
 
@@ -16,8 +23,10 @@ struct SurfaceCurve::Implementation {
   Neighbours neighbours;
   std::vector<ComponentReport> components;
   std::vector<Sheet> sheets;  ///< in the order in which they are walked
-  std::vector<std::array<Eigen::Vector3f, 3>> corner_normals;
+  std::vector<DotSurface> dot_surfaces;
 };
+
+std::vector<DotSurface> find_dot_surfaces(const TexturedMesh& mesh, const Neighbours& neighbours);
 
 /// Unit normals per corner: the mean, weighted by angle, over the triangles around the vertex up to the next sharp
 /// edge.

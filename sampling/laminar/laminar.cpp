@@ -202,7 +202,7 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
 
   SurfaceCurve::Implementation surroundings(mesh);
   surroundings.neighbours = find_neighbours(mesh.triangles);
-  surroundings.corner_normals = smooth_corner_normals(mesh, surroundings.neighbours);
+  surroundings.dot_surfaces = find_dot_surfaces(mesh, surroundings.neighbours);
   const std::vector<std::uint32_t> component_of = components_of(mesh, surroundings.neighbours);
   SliceWalk walk(surroundings, component_of, tone, pitch, length / static_cast<double>(count));
   for (std::size_t k = 0; k < slices.count(); ++k) {

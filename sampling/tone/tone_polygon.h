@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/tone_field.h"
+#include "sampling/tone/triangle_tone.h"
 
 /// Small parts of ToneField: bilinear look-up of a computed texel, and integrals of a linear tone over a convex
 /// polygon.
@@ -56,6 +56,25 @@ ToneIntegral integrate_linear(std::span<const Eigen::Vector2d> polygon, Tone ton
     f1 = f2;
   }
   if (sum.area_m2 < 0) sum = {-sum.area_m2, -sum.mass, -sum.first, -sum.square};
+  return sum;
+}
+
+/// Integrals over a convex polygon of a tone that is the same everywhere; `scale` as above.
+inline ToneIntegral integrate_constant(std::span<const Eigen::Vector2d> polygon, double tone, double scale) {
+  ToneIntegral sum;
+  double twice_area = 0;
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    const Eigen::Vector2d a = polygon[i - 1] - polygon[0], b = polygon[i] - polygon[0];
+    const double twice = a.x() * b.y() - a.y() * b.x();
+    twice_area += twice;
+    first += twice / 3 * (a + b);
+  }
+  if (twice_area == 0) return sum;
+  sum.area_m2 = .5 * scale * std::abs(twice_area);
+  sum.mass = tone * sum.area_m2;
+  sum.first = sum.mass * (polygon[0] + first / twice_area);
+  sum.square = tone * sum.mass;
   return sum;
 }
 

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "sampling/curve/patch_walk.h"
+#include "sampling/curve/patches.h"
 #include "sampling/curve/surface_curve.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"
@@ -34,14 +34,10 @@ TEST_P(RealSurface, IsMappedAndCoveredOnce) {
   ToneOptions options;
   options.untextured = Untextured::kMaterial;
   const ToneField tone(mesh, options);
-  const auto& sheets = curve.implementation().sheets;
-  const PatchRule rule{mesh.area_m2() / 5000, 4};
   double area = 0;
-  for (std::uint32_t s = 0; s < sheets.size(); ++s)
-    for (const BaseQuad& quad : sheets[s].base_quads)
-      walk_patches(sheets[s], s, quad, tone, rule, mass_of(sheets[s], quad, tone), [&](const Patch& patch) {
-        for (const ToneIntegral& integral : patch.integrals) area += integral.area_m2;
-      });
+  visit_patches(CurveMass(curve, tone), {mesh.area_m2() / 5000, 4}, [&](const Patch& patch) {
+    for (const PatchPiece& piece : patch.pieces) area += piece.integral.area_m2;
+  });
   EXPECT_NEAR(area / mesh.area_m2(), 1, 1e-9);
 
   SampleOptions sample;

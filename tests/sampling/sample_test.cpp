@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "sampling/curve/patch_walk.h"
+#include "sampling/curve/patches.h"
 #include "sampling/curve/surface_curve.h"
 #include "sampling/input_error.h"
 #include "sampling/mesh_repair.h"
@@ -62,13 +62,6 @@ double mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-void visit_patches(const SurfaceCurve& curve, const ToneField& tone, const PatchRule& rule, const PatchVisitor& visit) {
-  const auto& implementation = curve.implementation();
-  for (std::uint32_t s = 0; s < implementation.sheets.size(); ++s)
-    for (const BaseQuad& quad : implementation.sheets[s].base_quads)
-      walk_patches(implementation.sheets[s], s, quad, tone, rule, mass_of(implementation.sheets[s], quad, tone), visit);
-}
-
 TEST(Sample, PatchesCoverTheSurfaceOnceWhateverTheMesh) {
   for (const auto& [name, awkward] : test::awkward_meshes()) {
     SCOPED_TRACE(name);
@@ -76,9 +69,9 @@ TEST(Sample, PatchesCoverTheSurfaceOnceWhateverTheMesh) {
     const SurfaceCurve curve(mesh);
     const ToneField tone(mesh, {});
     double area = 0, mass = 0;
-    visit_patches(curve, tone, {mesh.area_m2() / 500, 4}, [&](const Patch& patch) {
+    visit_patches(CurveMass(curve, tone), {mesh.area_m2() / 500, 4}, [&](const Patch& patch) {
       mass += patch.mass;
-      for (const ToneIntegral& integral : patch.integrals) area += integral.area_m2;
+      for (const PatchPiece& piece : patch.pieces) area += piece.integral.area_m2;
     });
     EXPECT_NEAR(area / mesh.area_m2(), 1, 1e-9);
     EXPECT_NEAR(mass / mesh.area_m2(), 1, 1e-9);
@@ -115,28 +108,59 @@ TexturedMesh ramp() {
   return mesh;
 }
 
-TEST(Sample, EveryStratumHasItsMass) {
+/// Each stratum's mass, measured again on the polygons that it is cut from; the worst error, in dots.
+double worst_stratum_error(const CurveMass& mass, std::uint64_t count,
+                           const std::function<double(const PatchPiece&)>& exact) {
+  const double dot_mass = mass.total_m2() / static_cast<double>(count);
+  std::vector<double> masses(count);
+  visit_stretches(mass, options_for(count), [&](std::uint64_t stratum, const Patch& patch, double from, double to) {
+    for (const PatchPiece& piece : patch.pieces) masses.at(stratum) += (to - from) * exact(piece);
+  });
+  double worst = 0;
+  for (const double stratum : masses) worst = std::max(worst, std::abs(stratum / dot_mass - 1));
+  return worst;
+}
+
+TEST(Sample, EveryStratumOfARampHasItsMass) {
   const TexturedMesh mesh = ramp();
   const SurfaceCurve curve(mesh);
   const ToneField tone(mesh, {});
-  const double total = .5 * mesh.area_m2(), dot_mass = total / 3000;
-  double passed = 0, exact = 0, worst = 0;
-  visit_patches(curve, tone, {dot_mass, 4}, [&](const Patch& patch) {
-    passed += patch.mass;
-    for (const Piece& piece : patch.pieces)
-      for (std::uint32_t i = 2; i < piece.corner_count; ++i) {
-        const auto place = [&](std::uint32_t k) {
-          const Eigen::Vector2d& b = piece.corners[k].b;
-          return position(mesh, {piece.triangle, {1 - b.sum(), b.x(), b.y()}});
+  const CurveMass mass(curve, tone);
+  EXPECT_NEAR(mass.total_m2() / (.5 * mesh.area_m2()), 1, 1e-6);
+  const auto by_hand = [&](const PatchPiece& piece) {
+    const auto place = [&](std::size_t k) {
+      const Eigen::Vector2d& b = piece.corners_b[k];
+      return position(mesh, {piece.triangle, {1 - b.sum(), b.x(), b.y()}});
+    };
+    double sum = 0;
+    for (std::size_t i = 2; i < piece.corners_b.size(); ++i) {
+      const Vector3d a = place(0), b = place(i - 1), c = place(i);
+      const double x = (a.x() + b.x() + c.x()) / 3 / .04;
+      sum += .5 * (b - a).cross(c - a).norm() * (.05 + .9 * x);
+    }
+    return sum;
+  };
+  EXPECT_LT(worst_stratum_error(mass, 3000, by_hand), 1e-5);
+}
+
+TEST(Sample, EveryStratumHasItsMassWhateverTheMesh) {
+  const auto texel = [](int i, int j) {
+    return (i / 3 + j / 5) % 2 ? .95 : .45 + .45 * std::sin(.3 * i) * std::cos(.2 * j);
+  };
+  for (const CurveKind kind : {CurveKind::kHilbert, CurveKind::kPeano2})
+    for (const auto& [name, awkward] : test::awkward_meshes())
+      for (const bool is_textured : {false, true}) {
+        const TexturedMesh mesh = repair_mesh(is_textured ? test::with_texture(awkward, 64, 64, texel) : awkward).mesh;
+        const SurfaceCurve curve(mesh, kind);
+        const ToneField tone(mesh, {});
+        const CurveMass mass(curve, tone);
+        const auto again = [&](const PatchPiece& piece) {
+          return tone.integrate(piece.triangle, piece.corners_b).mass;
         };
-        const Vector3d a = place(0), b = place(i - 1), c = place(i);
-        const double x = (a.x() + b.x() + c.x()) / 3 / .04;
-        exact += .5 * (b - a).cross(c - a).norm() * (.05 + .9 * x);
+        for (const std::uint64_t count : {3, 2000})
+          EXPECT_LT(worst_stratum_error(mass, count, again), 1e-5)
+              << name << (is_textured ? ", textured, " : ", plain, ") << count;
       }
-    worst = std::max(worst, std::abs(passed - exact) / dot_mass);
-  });
-  EXPECT_NEAR(passed / total, 1, 1e-6);
-  EXPECT_LT(worst, 1e-5) << "dots; errors would add up along the curve";
 }
 
 TEST(Sample, DotsFollowTheTone) {

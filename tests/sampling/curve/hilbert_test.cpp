@@ -5,61 +5,104 @@
 #include <set>
 #include <vector>
 
-#include "sampling/curve/strata.h"
+#include "sampling/curve/curve_moment.h"
 
 namespace hilbrush {
 namespace {
 
 using Place = std::array<int, 3>;
 
-template <class Hilbert>
-void walk(Hilbert hilbert, int depth, const Place& place, std::vector<Place>& out) {
+/// A child's step along an axis from its parent's low corner.
+template <class Curve>
+int step_of(unsigned place, unsigned axis) {
+  for (unsigned k = 0; k < axis; ++k) place /= Curve::kSide;
+  return static_cast<int>(place % Curve::kSide);
+}
+
+template <class Curve>
+void walk(Curve curve, int depth, const Place& place, std::vector<Place>& out) {
   if (depth == 0) return out.push_back(place);
-  for (unsigned i = 0; i < Hilbert::kChildCount; ++i) {
+  for (unsigned i = 0; i < Curve::kChildCount; ++i) {
     Place child;
-    for (unsigned k = 0; k < 3; ++k) child[k] = 2 * place[k] + static_cast<int>(hilbert.place(i) >> k & 1u);
-    walk(hilbert.child(i), depth - 1, child, out);
+    for (unsigned k = 0; k < 3; ++k)
+      child[k] = static_cast<int>(Curve::kSide) * place[k] + step_of<Curve>(curve.place(i), k);
+    walk(curve.child(i), depth - 1, child, out);
   }
 }
 
-template <class Hilbert>
+template <class Curve>
 std::vector<Place> whole_walk(int depth) {
   std::vector<Place> places;
-  walk(Hilbert{}, depth, {0, 0, 0}, places);
+  walk(Curve{}, depth, {0, 0, 0}, places);
   return places;
 }
 
-template <class Hilbert>
-void expect_curve(int depth) {
-  const auto places = whole_walk<Hilbert>(depth);
+template <class Curve>
+std::vector<Place> expect_curve(int depth) {
+  const auto places = whole_walk<Curve>(depth);
   EXPECT_EQ(std::set<Place>(places.begin(), places.end()).size(), places.size()) << "every quad once";
   for (std::size_t i = 1; i < places.size(); ++i) {
     int steps = 0;
     for (std::size_t k = 0; k < 3; ++k) steps += std::abs(places[i][k] - places[i - 1][k]);
-    ASSERT_EQ(steps, 1) << "neighbours along the curve are neighbours in space, at " << i << " depth " << depth;
+    EXPECT_EQ(steps, 1) << "neighbours along the curve are neighbours in space, at " << i << " depth " << depth;
   }
   EXPECT_EQ(places.front(), (Place{0, 0, 0}));
-  EXPECT_EQ(places.back(), (Place{(1 << depth) - 1, 0, 0})) << "squares in a row join";
+  return places;
 }
 
 TEST(Hilbert, EachQuadOnceAndNeighboursAdjacent) {
-  for (int depth = 1; depth <= 6; ++depth) expect_curve<HilbertQuad>(depth);
+  for (int depth = 1; depth <= 6; ++depth)
+    EXPECT_EQ(expect_curve<HilbertQuad>(depth).back(), (Place{(1 << depth) - 1, 0, 0})) << "squares in a row join";
 }
 
 TEST(Hilbert, EachCubeOnceAndNeighboursAdjacent) {
-  for (int depth = 1; depth <= 4; ++depth) expect_curve<HilbertCube>(depth);
+  for (int depth = 1; depth <= 4; ++depth)
+    EXPECT_EQ(expect_curve<HilbertCube>(depth).back(), (Place{(1 << depth) - 1, 0, 0}));
 }
 
-TEST(Hilbert, MomentIsTheSumOverTheWalk) {
-  const int depth = 5;
-  const auto places = whole_walk<HilbertQuad>(depth);
-  const double n = static_cast<double>(places.size()), size = 1. / (1 << depth);
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    EXPECT_NEAR((hilbert_moment({}, static_cast<double>(i) / n) - sum).norm(), 0, 1e-14) << i;
-    sum += Eigen::Vector3d(places[i][0] + .5, places[i][1] + .5, 0) * size / n;
+TEST(Peano, EachQuadOnceAndNeighboursAdjacent) {
+  int side = 1;
+  for (int depth = 1; depth <= 4; ++depth) {
+    side *= 3;
+    EXPECT_EQ(expect_curve<PeanoQuad>(depth).back(), (Place{side - 1, side - 1, 0}));
   }
-  EXPECT_NEAR((hilbert_moment({}, 1) - Eigen::Vector3d(.5, .5, 0)).norm(), 0, 1e-14);
+}
+
+TEST(Peano, SquaresInARowJoin) {
+  std::vector<Place> places;
+  PeanoQuad curve;
+  for (int square = 0; square < 4; ++square, curve = curve.next_square()) {
+    std::vector<Place> here;
+    walk(curve, 2, {0, 0, 0}, here);
+    for (Place& place : here) place[0] += 9 * square;
+    if (!places.empty()) {
+      EXPECT_EQ(here.front()[0], places.back()[0] + 1);
+      EXPECT_EQ(here.front()[1], places.back()[1]);
+    }
+    places = here;
+  }
+}
+
+template <class Curve>
+void expect_moments(int depth, double side) {
+  const auto places = whole_walk<Curve>(depth);
+  const double n = static_cast<double>(places.size());
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double share = static_cast<double>(i) / n;
+    EXPECT_NEAR((curve_moment(Curve{}, share) - sum).norm(), 0, 1e-14) << i;
+    const Eigen::Vector2d low(places[i][0] / side, places[i][1] / side);
+    const Eigen::Vector2d place = curve_place(Curve{}, share + .5 / n) - low;
+    EXPECT_GE(place.minCoeff(), -1e-12);
+    EXPECT_LE(place.maxCoeff(), 1 / side + 1e-12);
+    sum += (low + Eigen::Vector2d::Constant(.5 / side)) / n;
+  }
+  EXPECT_NEAR((curve_moment(Curve{}, 1) - Eigen::Vector2d(.5, .5)).norm(), 0, 1e-14);
+}
+
+TEST(CurveMoment, IsTheSumOverTheWalk) {
+  expect_moments<HilbertQuad>(5, 32);
+  expect_moments<PeanoQuad>(3, 27);
 }
 
 }  // namespace

@@ -1,0 +1,91 @@
+#include "sampling/curve/curve_mass.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sampling/check.h"
+#include "sampling/curve/quad_walk.h"
+
+namespace hilbrush {
+namespace {
+
+/// Quads that one thread takes at once.
+constexpr std::size_t kGrain = 256;
+
+template <class Curve>
+void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass* pieces) {
+  constexpr int kDimensions = kDimensionsOf<Curve>;
+  const Sheet& sheet = mass.sheet_of(result);
+  const BaseQuad& quad = mass.base_quad(result);
+  double total = 0, squares = 0;
+  for (std::uint32_t i = 0; i < quad.face_count; ++i) {
+    const SheetFace& face = sheet.face_of(quad, i);
+    const TriangleTone tone = mass.tone.on(face.triangle);
+    if (tone.is_blank()) continue;
+    auto piece = whole_piece<kDimensions>(sheet, mass.curve.mesh, face);
+    clip_to_box<kDimensions>(piece, quad.low.template head<kDimensions>(), quad.size);
+    const ToneIntegral integral = integrate(tone, piece);
+    if (!(integral.mass > 0)) continue;
+    const Eigen::Vector2d centre = integral.first / integral.mass;
+    pieces[i] = {integral.mass, centre.cast<float>(), static_cast<float>(integral.area_m2),
+                 static_cast<float>(integral.square)};
+    total += integral.mass;
+    result.moment_O +=
+        integral.mass * position(mass.curve.mesh, {face.triangle, {1 - centre.sum(), centre.x(), centre.y()}});
+    if constexpr (kDimensions == 2) squares += integral.square * FaceFrame(sheet, mass.curve.mesh, face).density;
+  }
+  if constexpr (kDimensions == 2)
+    if (std::isfinite(squares))
+      result.misplaced = static_cast<float>(std::sqrt(std::max(0., squares * quad.size * quad.size - total * total)));
+}
+
+}  // namespace
+
+std::size_t CurveMass::Implementation::quad_at(double at) const {
+  const auto above = std::upper_bound(mass_before.begin() + 1, mass_before.end() - 1, at);
+  return static_cast<std::size_t>(above - mass_before.begin()) - 1;
+}
+
+CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
+    : implementation_(std::make_unique<Implementation>(curve.implementation(), tone)) {
+  CHECK(&curve.mesh() == &tone.mesh());
+  Implementation& mass = *implementation_;
+  std::size_t piece_count = 0;
+  for (std::uint32_t s = 0; s < mass.curve.sheets.size(); ++s) {
+    mass.first_piece.push_back(piece_count);
+    piece_count += mass.curve.sheets[s].face_lists.size();
+    for (std::uint32_t q = 0; q < mass.curve.sheets[s].base_quads.size(); ++q) mass.quads.push_back({s, q});
+  }
+  mass.pieces.resize(piece_count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mass.quads.size(), kGrain), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      QuadMass& quad = mass.quads[i];
+      PieceMass* pieces = mass.pieces.data() + (mass.pieces_of(quad) - mass.pieces.data());
+      with_curve(mass.sheet_of(quad).kind, [&]<class Curve>(Curve) { measure<Curve>(mass, quad, pieces); });
+    }
+  });
+  mass.painted_area_m2.assign(mass.curve.sheets.size(), 0);
+  mass.mass_before.assign(mass.quads.size() + 1, 0);
+  for (std::size_t i = 0; i < mass.quads.size(); ++i) {
+    const QuadMass& quad = mass.quads[i];
+    const PieceMass* pieces = mass.pieces_of(quad);
+    double sum = 0;
+    for (std::uint32_t k = 0; k < mass.base_quad(quad).face_count; ++k) {
+      sum += pieces[k].mass;
+      if (pieces[k].mass > 0) mass.painted_area_m2[quad.sheet] += pieces[k].area_m2;
+    }
+    mass.mass_before[i + 1] = mass.mass_before[i] + sum;
+  }
+}
+
+CurveMass::~CurveMass() = default;
+CurveMass::CurveMass(CurveMass&&) noexcept = default;
+
+double CurveMass::total_m2() const {
+  return implementation_->total();
+}
+
+}  // namespace hilbrush

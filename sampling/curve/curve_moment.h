@@ -1,0 +1,95 @@
+#pragma once
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+
+#include "sampling/curve/hilbert.h"
+#include "sampling/curve/peano.h"
+
+/// Where a curve in the plane is after a share of its way, and the integral of its place so far, by a table that takes
+/// a few levels at once.
+namespace hilbrush {
+
+/// All children of a few levels below a square, in order of the curve, by permutation.
+template <class Curve>
+struct CurveTable {
+  static constexpr unsigned kLevels = Curve::kSide == 2 ? 3 : 2;
+  static constexpr unsigned kAlong = Curve::kSide == 2 ? 8 : 9;  ///< children along a side
+  static constexpr unsigned kCount = kAlong * kAlong;
+
+  struct Entry {
+    double x = 0, y = 0;                ///< low corner in the unit square
+    double moment_x = 0, moment_y = 0;  ///< sum over the children before of their middles
+    std::uint8_t permutation = 0;
+  };
+  std::array<std::array<Entry, kCount>, Curve::kPermutationCount> entries;
+
+  constexpr CurveTable() : entries{} {
+    for (unsigned p = 0; p < Curve::kPermutationCount; ++p) {
+      double moment_x = 0, moment_y = 0;
+      for (unsigned i = 0; i < kCount; ++i) {
+        Entry& entry = entries[p][i];
+        Curve curve(static_cast<std::uint8_t>(p));
+        unsigned column = 0, row = 0, divisor = kCount;
+        for (unsigned level = 0; level < kLevels; ++level) {
+          divisor /= Curve::kChildCount;
+          const unsigned child = i / divisor % Curve::kChildCount, place = curve.place(child);
+          column = column * Curve::kSide + place % Curve::kSide;
+          row = row * Curve::kSide + place / Curve::kSide;
+          curve = curve.child(child);
+        }
+        entry = {static_cast<double>(column) / kAlong, static_cast<double>(row) / kAlong, moment_x, moment_y,
+                 curve.permutation};
+        moment_x += entry.x + .5 / kAlong;
+        moment_y += entry.y + .5 / kAlong;
+      }
+    }
+  }
+};
+
+template <class Curve>
+inline constexpr CurveTable<Curve> kCurveTable{};
+
+/// Steps of the table that reach any depth that doubles can tell apart.
+inline constexpr int kMostCurveSteps = 8;
+
+/// Integral of the curve's place over its first `share`, in the unit square. Within each of the smallest squares (side
+/// 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the place is taken as its middle.
+template <class Curve>
+Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMostCurveSteps) {
+  using Table = CurveTable<Curve>;
+  Eigen::Vector2d moment(0, 0), low(0, 0);
+  double size = 1, weight = 1;  // of the child that the walk is in: side, and share of the curve
+  for (int step = 0; step < steps; ++step) {
+    const double f = Table::kCount * std::clamp(share, 0., 1.);
+    const unsigned i = std::min(static_cast<unsigned>(f), Table::kCount - 1);
+    const auto& entry = kCurveTable<Curve>.entries[curve.permutation][i];
+    weight /= Table::kCount;
+    moment += weight * (static_cast<double>(i) * low + size * Eigen::Vector2d(entry.moment_x, entry.moment_y));
+    low += size * Eigen::Vector2d(entry.x, entry.y);
+    size /= Table::kAlong;
+    curve = Curve(entry.permutation);
+    share = f - i;
+  }
+  return moment + weight * share * (low + Eigen::Vector2d::Constant(size / 2));
+}
+
+/// Where the curve is after `share` of its way, in the unit square.
+template <class Curve>
+Eigen::Vector2d curve_place(Curve curve, double share) {
+  using Table = CurveTable<Curve>;
+  Eigen::Vector2d low(0, 0);
+  double size = 1;
+  for (int step = 0; step < kMostCurveSteps; ++step) {
+    const double f = Table::kCount * std::clamp(share, 0., 1.);
+    const unsigned i = std::min(static_cast<unsigned>(f), Table::kCount - 1);
+    const auto& entry = kCurveTable<Curve>.entries[curve.permutation][i];
+    low += size * Eigen::Vector2d(entry.x, entry.y);
+    size /= Table::kAlong;
+    curve = Curve(entry.permutation);
+    share = f - i;
+  }
+  return low + Eigen::Vector2d::Constant(size / 2);
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,253 @@
+#include "sampling/curve/dot_block.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sampling/check.h"
+#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/stratum.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// How far outside of a face rounding may put a place that is in it, as a share of the face.
+constexpr double kOnSide = 1e-12;
+/// Where a sequence hits blank surface within a patch, so many other places in the patch are tried.
+constexpr int kMostTries = 8;
+
+SurfacePoint surface_point(std::uint32_t triangle, const Vector2d& b) {
+  return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
+}
+
+/// A place on the square, on the faces of a base quad.
+struct Lifted {
+  std::uint32_t frame = 0;
+  Vector2d b = Vector2d::Zero();
+  bool is_inside = false;
+};
+
+Lifted lift(const std::vector<FaceFrame>& frames, const Vector2d& place) {
+  Lifted best;
+  double deepest = -std::numeric_limits<double>::infinity();
+  Vector2d best_along = Vector2d::Zero();
+  for (std::uint32_t i = 0; i < frames.size(); ++i) {
+    const Vector2d along = frames[i].to_face * (place - frames[i].place);
+    const double depth = std::min({along.x(), along.y(), 1 - along.x() - along.y()});
+    if (!(depth > deepest)) continue;
+    best.frame = i, deepest = depth, best_along = along;
+    if (depth >= 0) break;
+  }
+  best.is_inside = deepest >= -kOnSide;
+  best_along = best_along.cwiseMax(0.);
+  if (best_along.sum() > 1) best_along /= best_along.sum();
+  const FaceFrame& frame = frames[best.frame];
+  best.b = frame.b + frame.face_to_b * best_along;
+  return best;
+}
+
+/// Steps of the curve's table that are fine enough for a patch with so many dots.
+int curve_steps(double dots) {
+  return dots < .5 ? 1 : dots < 30 ? 2 : dots < 2000 ? 3 : dots < 1e5 ? 4 : kMostCurveSteps;
+}
+
+template <class Curve>
+Vector2d mean_place(Curve curve, double from, double to, int steps) {
+  return (curve_moment(curve, to, steps) - curve_moment(curve, from, steps)) / (to - from);
+}
+
+/// Puts one dot at the centre of each stratum.
+class CentreWriter {
+ public:
+  CentreWriter(const DotPlan& plan, std::vector<Dot>& dots) : plan_(plan), dots_(dots) {}
+
+  /// A whole base quad.
+  void add_quad(std::size_t index) {
+    const QuadMass& quad = plan_.mass.quads[index];
+    const double mass = plan_.mass.mass_of(index);
+    last_quad_ = index;
+    StratumPart& part = begin_part(quad.sheet);
+    part.mass += mass;
+    part.moment_O += quad.moment_O;
+    part.triangle = kNoTriangle;
+    if (mass <= part.heaviest_mass) return;
+    part.heaviest_mass = mass;
+    part.heaviest_quad = index;
+  }
+
+  template <class Curve>
+  void add(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
+           double to) {
+    if (!(to > from)) return;
+    last_quad_ = walk.quad();
+    if constexpr (QuadWalk<Curve>::kDimensions == 2)
+      if (kind == PatchKind::kEven) return add_even(walk, node, from, to);
+    add_pieces(walk, node, from, to);
+  }
+
+  void close(std::uint64_t) {
+    // Rounding may leave nothing to a stratum at the very end of the curve.
+    if (stratum_.is_empty()) add_quad(last_quad_);
+    const StratumPart& part = stratum_.heaviest();
+    dots_.push_back(make_dot(plan_.mass.curve, plan_.mass.tone, centre_on_surface(plan_.mass, part),
+                             plan_.mass.curve.sheets[part.sheet].component));
+    stratum_.clear();
+  }
+
+ private:
+  StratumPart& begin_part(std::uint32_t sheet) {
+    StratumPart& part = stratum_.on(sheet);
+    is_new_ = !(part.mass > 0);
+    return part;
+  }
+
+  /// Notes in which triangle a bit lies.
+  void add_in_triangle(StratumPart& part, std::uint32_t triangle, const Vector2d& moment_b) const {
+    if (is_new_) part.triangle = triangle;
+    if (part.triangle != triangle)
+      part.triangle = kNoTriangle;
+    else
+      part.moment_b += moment_b;
+  }
+
+  template <class Curve>
+  void add_even(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
+    const double mass = (to - from) * node.mass;
+    const int steps = curve_steps(node.mass / plan_.rule.dot_mass);
+    const Vector2d place = node.low + node.size * mean_place(node.curve, from, to, steps);
+    const Lifted lifted = lift(walk.frames(), place);
+    const FaceFrame& frame = walk.frames()[lifted.frame];
+    StratumPart& part = begin_part(walk.sheet());
+    part.moment_O += mass * frame.at(lifted.b);
+    add_in_triangle(part, frame.triangle, mass * lifted.b);
+    part.mass += mass;
+    if (mass <= part.heaviest_mass) return;
+    part.heaviest_mass = mass;
+    part.heaviest = surface_point(frame.triangle, lifted.b);
+    part.polygon_size = 0;
+    part.heaviest_quad = StratumPart::kNoQuad;
+  }
+
+  template <class Curve>
+  void add_pieces(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
+    const double share = to - from;
+    StratumPart& part = begin_part(walk.sheet());
+    const auto& heaviest = walk.heaviest(node);
+    for (const auto index : node.pieces) {
+      const auto& held = walk.held(index);
+      const FaceFrame& frame = walk.frames()[held.frame];
+      const double scale = share * node.scale, mass = scale * held.integral.mass;
+      const Vector2d moment_b = scale * held.integral.first;
+      part.moment_O += mass * frame.origin_O + moment_b.x() * frame.e1_O + moment_b.y() * frame.e2_O;
+      add_in_triangle(part, frame.triangle, moment_b);
+      is_new_ = false;
+    }
+    if constexpr (QuadWalk<Curve>::kDimensions == 2)
+      if (share < 1) shift_stretch(part, walk, node, from, to);
+    part.mass += share * node.mass;
+    const double mass = share * node.scale * heaviest.integral.mass;
+    if (mass <= part.heaviest_mass) return;
+    part.heaviest_mass = mass;
+    part.heaviest =
+        surface_point(walk.frames()[heaviest.frame].triangle, heaviest.integral.first / heaviest.integral.mass);
+    part.polygon_size = heaviest.piece.corner_count;
+    for (std::size_t i = 0; i < part.polygon_size; ++i) part.polygon[i] = heaviest.piece.corners[i].b;
+    part.heaviest_quad = StratumPart::kNoQuad;
+  }
+
+  /// Where a stretch of a small patch lies beside the patch's middle, as the curve runs.
+  template <class Curve>
+  static void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
+                            double from, double to) {
+    const Lifted middle = lift(walk.frames(), node.low + Vector2d::Constant(.5 * node.size));
+    const Lifted there = lift(walk.frames(), node.low + node.size * mean_place(node.curve, from, to, 1));
+    const FaceFrame &at_middle = walk.frames()[middle.frame], &at_there = walk.frames()[there.frame];
+    const double mass = (to - from) * node.mass;
+    part.moment_O += mass * (at_there.at(there.b) - at_middle.at(middle.b));
+    if (at_middle.triangle == part.triangle && at_there.triangle == part.triangle)
+      part.moment_b += mass * (there.b - middle.b);
+    else
+      part.triangle = kNoTriangle;
+  }
+
+  const DotPlan& plan_;
+  std::vector<Dot>& dots_;
+  Stratum stratum_;
+  bool is_new_ = true;  ///< nothing was added to the part before this patch
+  std::size_t last_quad_ = 0;
+};
+
+/// Puts a dot where a number of the sequence falls.
+class PlaceWriter {
+ public:
+  PlaceWriter(const DotPlan& plan, std::vector<Dot>& dots) : plan_(plan), dots_(dots) {}
+
+  template <class Curve>
+  void put(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind, double share,
+           std::uint64_t) {
+    put_at(point_in(walk, node, share), walk.sheet());
+  }
+  /// At the end of the curve, beyond what rounding has left of its last quad.
+  void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads[quad].sheet); }
+
+ private:
+  void put_at(const SurfacePoint& point, std::uint32_t sheet) {
+    dots_.push_back(make_dot(plan_.mass.curve, plan_.mass.tone, point, plan_.mass.curve.sheets[sheet].component));
+  }
+
+  /// Within a patch the mass is taken as even on what is painted of it: where the curve is on blank surface, or beside
+  /// the surface, other places of the patch have their turn.
+  template <class Curve>
+  SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double share) const {
+    if constexpr (QuadWalk<Curve>::kDimensions == 2) {
+      const double dots = std::max(1., node.mass / plan_.rule.dot_mass);
+      for (int i = 0; i < kMostTries; ++i) {
+        const double at = share + std::fmod(i * std::numbers::phi, 1.) / dots;
+        const Vector2d place = node.low + node.size * curve_place(node.curve, at - std::floor(at));
+        const Lifted lifted = lift(walk.frames(), place);
+        const SurfacePoint point = surface_point(walk.frames()[lifted.frame].triangle, lifted.b);
+        if (lifted.is_inside && plan_.mass.tone.asked(point) > 0) return point;
+      }
+    }
+    if (node.pieces.empty()) return heaviest_point(plan_.mass, walk.quad());
+    const auto& heaviest = walk.heaviest(node);
+    const std::uint32_t triangle = walk.frames()[heaviest.frame].triangle;
+    const SurfacePoint centre = surface_point(triangle, heaviest.integral.first / heaviest.integral.mass);
+    if (plan_.mass.tone.asked(centre) > 0) return centre;
+    std::vector<Vector2d> polygon;
+    for (const auto& corner : heaviest.piece.all()) polygon.push_back(corner.b);
+    return point_with_tone(plan_.mass.tone, triangle, polygon);
+  }
+
+  const DotPlan& plan_;
+  std::vector<Dot>& dots_;
+};
+
+}  // namespace
+
+DotPlan::DotPlan(const CurveMass::Implementation& m, const SampleOptions& options, std::uint64_t count)
+    : mass(m),
+      strata{m.total(), count},
+      rule{m.total() / static_cast<double>(count), options.omega, options.uniform_depth.value_or(-1)} {
+  if (options.sampler != Sampler::kCentroid && options.sampler != Sampler::kFine)
+    sequence.emplace(options.sampler, count, options.seed);
+}
+
+DotBlock make_block(const DotPlan& plan, std::uint64_t first, std::uint64_t last) {
+  DotBlock block;
+  block.dots.reserve(last - first);
+  if (plan.sequence) {
+    PlaceWriter writer(plan, block.dots);
+    find_places(plan, first, last, writer, block.patches_at_depth);
+  } else {
+    CentreWriter writer(plan, block.dots);
+    cut_strata(plan, first, last, writer, block.patches_at_depth);
+  }
+  CHECK_EQ(block.dots.size(), last - first);
+  return block;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,84 @@
+#include "sampling/curve/stratum.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/quad_walk.h"
+
+namespace hilbrush {
+namespace {
+
+/// A place that asks for less than this share of what its stratum asks for is blank.
+constexpr double kBlankShare = 1e-3;
+/// ... which no place does that asks for this much: nothing asks for a thousand times as much.
+constexpr double kSurelyPainted = .01;
+
+SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d& b) {
+  return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
+}
+
+/// Of a base quad's faces with mass, the point nearest to `target_O`.
+SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t quad_index,
+                             const Eigen::Vector3d& target_O) {
+  const QuadMass& quad = mass.quads[quad_index];
+  const BaseQuad& base = mass.base_quad(quad);
+  const PieceMass* pieces = mass.pieces_of(quad);
+  NearestPoint nearest{{}, std::numeric_limits<double>::infinity()};
+  for (std::uint32_t i = 0; i < base.face_count; ++i) {
+    if (!(pieces[i].mass > 0)) continue;
+    const NearestPoint there =
+        nearest_in_triangle(mass.curve.mesh, mass.sheet_of(quad).face_of(base, i).triangle, target_O);
+    if (there.distance2 < nearest.distance2) nearest = there;
+  }
+  return nearest.point;
+}
+
+SurfacePoint heaviest_point(const CurveMass::Implementation& mass, const StratumPart& part) {
+  if (part.heaviest_quad != StratumPart::kNoQuad) return heaviest_point(mass, part.heaviest_quad);
+  if (part.polygon_size == 0 || mass.tone.asked(part.heaviest) > 0) return part.heaviest;
+  return point_with_tone(mass.tone, part.heaviest.triangle, {part.polygon.data(), part.polygon_size});
+}
+
+}  // namespace
+
+SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad_index) {
+  const QuadMass& quad = mass.quads[quad_index];
+  const BaseQuad& base = mass.base_quad(quad);
+  const Sheet& sheet = mass.sheet_of(quad);
+  const PieceMass* pieces = mass.pieces_of(quad);
+  const auto i = static_cast<std::uint32_t>(
+      std::max_element(pieces, pieces + base.face_count,
+                       [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; }) -
+      pieces);
+  const SheetFace& face = sheet.face_of(base, i);
+  const SurfacePoint centre = surface_point(face.triangle, pieces[i].centre_b.cast<double>());
+  if (mass.tone.asked(centre) > 0) return centre;
+  std::vector<Eigen::Vector2d> polygon;
+  with_curve(sheet.kind, [&]<class Curve>(Curve) {
+    constexpr int kDimensions = kDimensionsOf<Curve>;
+    auto piece = whole_piece<kDimensions>(sheet, mass.curve.mesh, face);
+    clip_to_box<kDimensions>(piece, base.low.template head<kDimensions>(), base.size);
+    for (const auto& corner : piece.all()) polygon.push_back(corner.b);
+  });
+  return point_with_tone(mass.tone, face.triangle, polygon);
+}
+
+SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, const StratumPart& part) {
+  SurfacePoint point;
+  if (part.triangle != kNoTriangle) {
+    // A stratum in the plane of one triangle needs no search.
+    point = surface_point(part.triangle, part.moment_b / part.mass);
+  } else {
+    const Eigen::Vector3d target = part.moment_O / part.mass;
+    const SurfacePoint start =
+        part.heaviest_quad == StratumPart::kNoQuad ? part.heaviest : nearest_in_quad(mass, part.heaviest_quad, target);
+    point = walk_towards(mass.curve.mesh, mass.curve.neighbours, start, target);
+  }
+  const double asked = mass.tone.asked(point);
+  if (asked >= kSurelyPainted) return point;
+  const SurfacePoint heaviest = heaviest_point(mass, part);
+  return asked > 0 && asked >= kBlankShare * mass.tone.asked(heaviest) ? point : heaviest;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,58 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sampling/curve/curve_mass.h"
+
+/// What a stratum gathers from the patches that it is made of, until it is known where its dot goes.
+namespace hilbrush {
+
+/// The share of a stratum on one sheet: a stratum that spans two sheets puts its dot on one of them.
+struct StratumPart {
+  std::uint32_t sheet = 0;
+  double mass = 0;
+  Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times place
+
+  /// The one triangle it lies in, and mass times place there; kNoTriangle if there are several.
+  std::uint32_t triangle = kNoTriangle;
+  Eigen::Vector2d moment_b = Eigen::Vector2d::Zero();
+
+  /// The centre of its heaviest bit, and the polygon that this is the centre of (empty: the bit is all painted).
+  double heaviest_mass = 0;
+  SurfacePoint heaviest;
+  std::array<Eigen::Vector2d, 12> polygon;
+  std::size_t polygon_size = 0;
+  /// ... or, if the heaviest bit is a whole base quad, that.
+  static constexpr std::size_t kNoQuad = ~std::size_t{0};
+  std::size_t heaviest_quad = kNoQuad;
+};
+
+class Stratum {
+ public:
+  void clear() { current_ = best_ = StratumPart{}; }
+  bool is_empty() const { return !(current_.mass > 0) && !(best_.mass > 0); }
+
+  /// The part on `sheet`, to be added to.
+  StratumPart& on(std::uint32_t sheet) {
+    if (current_.sheet != sheet) {
+      if (current_.mass > best_.mass) best_ = current_;
+      current_ = StratumPart{};
+      current_.sheet = sheet;
+    }
+    return current_;
+  }
+  const StratumPart& heaviest() const { return current_.mass >= best_.mass ? current_ : best_; }
+
+ private:
+  StratumPart current_, best_;
+};
+
+/// The stratum's centre of mass, put back on the surface; where that is blank, a painted point of its heaviest bit.
+SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, const StratumPart& part);
+
+/// A painted point of a base quad that has mass, in the triangle that has most.
+SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad);
+
+}  // namespace hilbrush

@@ -1,0 +1,228 @@
+// Times the curve on a subdivided model: base tree, exact masses under a texture, and dots. Prints CPU and wall
+// seconds, patches, path constants, the worst mass of a stratum, memory, and an answer hash, which is the same for any
+// number of threads.
+//   curve_bench MODEL [TRIANGLES=268000] [TEXELS=2048] [MOST_DOTS=10000000] [STREAMED_DOTS=0] [FILE]
+// STREAMED_DOTS go to FILE as binary PLY. Without textures of its own the model wears a picture of waves and lines, by
+// projection.
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+#include "sampling/curve/patches.h"
+#include "sampling/dots_file.h"
+#include "sampling/images/image_file.h"
+#include "sampling/mesh_repair.h"
+#include "sampling/model_file.h"
+#include "sampling/placement.h"
+#include "sampling/sample.h"
+#include "tests/support/subdivide.h"
+
+namespace {
+
+using namespace hilbrush;
+
+constexpr int kRepeats = 3;
+/// Strata are measured again one by one up to so many.
+constexpr std::uint64_t kMostChecked = 100'000;
+
+struct Seconds {
+  double cpu = 0, wall = 0;
+};
+
+double cpu_now() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+/// Best of several.
+template <class Work>
+Seconds time(int repeats, Work work) {
+  Seconds best{1e300, 1e300};
+  for (int i = 0; i < repeats; ++i) {
+    const auto wall = std::chrono::steady_clock::now();
+    const double cpu = cpu_now();
+    work();
+    best.cpu = std::min(best.cpu, cpu_now() - cpu);
+    best.wall = std::min(best.wall, std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
+  }
+  return best;
+}
+
+/// Most memory so far, in MB; reset_peak() begins anew.
+double peak_mb() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return std::atof(line.c_str() + 6) / 1024;
+  return 0;
+}
+void reset_peak() {
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+/// Waves, flat parts, and fine lines.
+Texture picture(int texels) {
+  Texture texture;
+  texture.width = texture.height = texels;
+  texture.luminance.reserve(static_cast<std::size_t>(texels) * static_cast<std::size_t>(texels));
+  for (int j = 0; j < texels; ++j)
+    for (int i = 0; i < texels; ++i) {
+      const double x = static_cast<double>(i) / texels, y = static_cast<double>(j) / texels;
+      double light = .5 + .3 * std::sin(40 * x) * std::cos(31 * y) + .15 * std::sin(211 * x + 97 * y);
+      if ((i / 64 + j / 64) % 7 == 0) light = .2;
+      if (i % 128 < 3 || (i + j) % 192 < 2) light = .9;
+      texture.luminance.push_back(static_cast<float>(light));
+    }
+  return texture;
+}
+
+/// The picture, projected along z and scaled to the model's bounds.
+TexturedMesh with_picture(TexturedMesh mesh, int texels) {
+  const auto box = bounds(mesh);
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
+    for (int c = 0; c < 3; ++c) {
+      const Eigen::Vector3d p = (mesh.corner(t, c) - box[0]).cwiseQuotient(box[1] - box[0]);
+      mesh.corner_uv[t][static_cast<std::size_t>(c)] = {.5 * p.x() + .5 * p.z(), p.y()};
+    }
+  mesh.textures = {picture(texels)};
+  Material material;
+  material.source = ColorSource::kTexture;
+  material.texture = 0;
+  mesh.materials = {material};
+  std::fill(mesh.material_index.begin(), mesh.material_index.end(), 0u);
+  return mesh;
+}
+
+TexturedMesh load(const std::string& file, std::size_t triangle_count) {
+  PlacementOptions placement;
+  placement.size_m = .08;
+  TexturedMesh mesh = repair_mesh(place_on_table(load_model(file, load_image_file), placement)).mesh;
+  for (auto& corners : mesh.corner_luminance) corners.fill(0);
+  return test::subdivided(std::move(mesh), triangle_count);
+}
+
+/// FNV-1a over positions.
+struct Hash {
+  std::uint64_t value = 0xcbf29ce484222325u;
+  void add(const Dot& dot) {
+    std::array<std::uint64_t, 3> bits;
+    std::memcpy(bits.data(), dot.position_O.data(), sizeof bits);
+    for (const auto b : bits) value = (value ^ b) * 0x100000001b3u;
+  }
+};
+
+double worst_stratum_error(const CurveMass& mass, const ToneField& tone, const SampleOptions& options) {
+  const double dot_mass = mass.total_m2() / static_cast<double>(*options.dot_count);
+  std::vector<double> masses(*options.dot_count);
+  visit_stretches(mass, options, [&](std::uint64_t stratum, const Patch& patch, double from, double to) {
+    for (const PatchPiece& piece : patch.pieces)
+      masses[stratum] += (to - from) * tone.integrate(piece.triangle, piece.corners_b).mass;
+  });
+  double worst = 0;
+  for (const double stratum : masses) worst = std::max(worst, std::abs(stratum / dot_mass - 1));
+  return worst;
+}
+
+void measure(const char* title, const SurfaceCurve& curve, const ToneOptions& tone_options, std::uint64_t most_dots,
+             std::size_t threads) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  const TexturedMesh& mesh = curve.mesh();
+  const ToneField tone(mesh, tone_options);
+  const Seconds mass_s = time(kRepeats, [&] { CurveMass(curve, tone); });
+  const CurveMass mass(curve, tone);
+  std::printf("\n%s, %zu thread(s): exact masses %.3f s CPU %.3f s wall\n", title, threads, mass_s.cpu, mass_s.wall);
+  std::printf("      dots   CPU s  wall s  M dots/CPU s  patches/dot  path  worst mass  answer\n");
+  for (std::uint64_t count = 10'000; count <= most_dots; count *= 10) {
+    SampleOptions options;
+    options.dot_count = count;
+    SampleReport report;
+    const Seconds s = time(kRepeats, [&] {
+      stream_dots(
+          mass, options, [](std::span<const Dot>) {}, &report);
+    });
+    Hash hash;
+    stream_dots(mass, options, [&](std::span<const Dot> dots) {
+      for (const Dot& dot : dots) hash.add(dot);
+    });
+    const bool is_checked = count <= kMostChecked && threads == 1;
+    std::printf("%10llu %7.4f %7.4f %13.2f %12.2f %5.3f  %-10s  %016llx\n", static_cast<unsigned long long>(count),
+                s.cpu, s.wall, static_cast<double>(count) / s.cpu * 1e-6,
+                static_cast<double>(report.patch_count) / static_cast<double>(count), report.path_constant,
+                is_checked ? (std::to_string(1e6 * worst_stratum_error(mass, tone, options)) + "e-6").c_str() : "-",
+                static_cast<unsigned long long>(hash.value));
+  }
+}
+
+void run(int argc, char** argv) {
+  const std::size_t triangles = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 268'000;
+  const int texels = argc > 3 ? std::atoi(argv[3]) : 2048;
+  const std::uint64_t most_dots = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 10'000'000;
+  const TexturedMesh mesh = load(argv[1], triangles);
+  const double mesh_mb = peak_mb();
+  const Seconds map = time(1, [&] { SurfaceCurve{mesh}; });
+  const SurfaceCurve curve(mesh);
+  std::size_t quads = 0, listed = 0;
+  Seconds tree;
+  for (const Sheet& sheet : curve.implementation().sheets) {
+    Sheet again = sheet;
+    tree.cpu += time(kRepeats, [&] {
+                  again.base_quads.clear();
+                  again.face_lists.clear();
+                  build_base_tree(again, mesh);
+                }).cpu;
+    quads += sheet.base_quads.size();
+    listed += sheet.face_lists.size();
+  }
+  std::printf(
+      "%zu triangles, %zu components; mapped and divided in %.2f s CPU, %.2f s wall; of it the base tree %.3f s CPU\n",
+      mesh.triangle_count(), curve.components().size(), map.cpu, map.wall, tree.cpu);
+  std::printf("base tree: %zu quads, %.2f quads a triangle; memory %.0f MB for the mesh, %.0f MB at most so far\n",
+              quads, static_cast<double>(listed) / static_cast<double>(mesh.triangle_count()), mesh_mb, peak_mb());
+  ToneOptions material;
+  material.untextured = Untextured::kMaterial;
+  for (const std::size_t threads : {1, 2}) measure("constant tone", curve, material, most_dots, threads);
+  const TexturedMesh painted = with_picture(mesh, texels);
+  const SurfaceCurve painted_curve(painted);
+  for (const std::size_t threads : {1, 2}) measure("texture", painted_curve, {}, most_dots, threads);
+  if (argc <= 6) return;
+
+  const ToneField tone(painted, {});
+  const CurveMass mass(painted_curve, tone);
+  reset_peak();
+  const double before_mb = peak_mb();
+  SampleOptions options;
+  options.dot_count = std::strtoull(argv[5], nullptr, 10);
+  options.dot_limit = *options.dot_count;
+  const Seconds s = time(1, [&] {
+    DotsFile file(argv[6], pitch_of(mass, options, *options.dot_count), *options.dot_count, {});
+    stream_dots(mass, options, [&](std::span<const Dot> dots) { file.add(dots); });
+    file.close();
+  });
+  std::printf("\n%llu dots streamed to %s: %.2f s CPU, %.2f s wall; %.0f MB before, %.0f MB at most\n",
+              static_cast<unsigned long long>(*options.dot_count), argv[6], s.cpu, s.wall, before_mb, peak_mb());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: curve_bench MODEL [TRIANGLES] [TEXELS] [MOST_DOTS] [STREAMED_DOTS FILE]\n");
+    return 2;
+  }
+  try {
+    run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "curve_bench: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
