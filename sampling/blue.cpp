@@ -46,21 +46,6 @@ IndexLists find_neighbours(const std::vector<PlacedStratum>& strata) {
   });
 }
 
-/// What place_dots would place.
-std::uint64_t count_dots(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options) {
-  SampleOptions few = options;
-  few.sampler = Sampler::kEven;
-  if (options.pitch_m && !options.dot_count) {
-    few.pitch_m = 1e6;
-    if (place_dots(curve, tone, few).dots.empty()) return 0;
-    few.pitch_m.reset();
-    few.dot_count = 1;
-    const double root_mass_m = place_dots(curve, tone, few).pitch_m;
-    return std::max<std::uint64_t>(1, std::llround(std::pow(root_mass_m / *options.pitch_m, 2)));
-  }
-  return *options.dot_count;
-}
-
 class Relaxation {
  public:
   Relaxation(const SurfaceCurve& curve, const ToneField& tone, const PlacedStrata& strata, std::uint64_t seed)
@@ -184,34 +169,56 @@ class Relaxation {
   std::vector<SurfacePlace> dots_;
 };
 
+std::vector<Dot> dots_at(const SurfaceCurve& curve, const ToneField& tone, const std::vector<SurfacePlace>& places) {
+  std::vector<Dot> dots(places.size());
+  tbb::parallel_for(std::size_t{0}, dots.size(), [&](std::size_t i) {
+    const SurfacePlace& place = places[i];
+    dots[i] = make_dot(curve.implementation(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
+                       place.component);
+  });
+  return dots;
+}
+
+/// Replaces the paths of the walk along the strata by those along the dots.
+void measure_paths(const std::vector<Dot>& dots, SampleReport& report) {
+  const auto constant = [](double length_m, std::uint64_t count, double area_m2) {
+    return count > 1 ? length_m / std::sqrt(static_cast<double>(count) * area_m2) : 0;
+  };
+  report.path_length_m = 0;
+  for (ComponentPath& path : report.components) path.dot_count = 0, path.path_length_m = 0;
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    ComponentPath& path = report.components.at(dots[i].component);
+    ++path.dot_count;
+    if (i == 0) continue;
+    const double length_m = (dots[i].position_O - dots[i - 1].position_O).norm();
+    report.path_length_m += length_m;
+    if (dots[i].component == dots[i - 1].component) path.path_length_m += length_m;
+  }
+  report.path_constant = constant(report.path_length_m, dots.size(), report.painted_area_m2);
+  for (ComponentPath& path : report.components)
+    path.path_constant = constant(path.path_length_m, path.dot_count, path.painted_area_m2);
+}
+
 }  // namespace
 
 DotSequence place_blue(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
                        SampleReport* report, const Progress& progress) {
-  const std::uint64_t count = count_dots(curve, tone, options);
+  const CurveMass mass(curve, tone);
+  const std::uint64_t count = count_dots(mass, options);
   DotSequence sequence;
   SampleReport figures;
-  sequence.pitch_m = options.pitch_m.value_or(0);
-  if (count == 0) {
-    if (report) *report = figures;
-    return sequence;
+  sequence.pitch_m = pitch_of(mass, options, count);
+  if (count > 0) {
+    const auto first_half = [&](double fraction) {
+      if (progress) progress(.5 * fraction);
+    };
+    const PlacedStrata strata = place_strata(mass, tone, options, count, figures, first_half);
+    Relaxation relaxation(curve, tone, strata, options.seed);
+    relaxation.choose(progress);
+    relaxation.refine(progress);
+    sequence.dots = dots_at(curve, tone, relaxation.dots());
+    measure_paths(sequence.dots, figures);
   }
-  const auto first_half = [&](double fraction) {
-    if (progress) progress(.5 * fraction);
-  };
-  const PlacedStrata strata = place_strata(curve, tone, options, count, figures, first_half);
-  Relaxation relaxation(curve, tone, strata, options.seed);
-  relaxation.choose(progress);
-  relaxation.refine(progress);
-
-  const std::vector<SurfacePlace>& places = relaxation.dots();
-  sequence.dots.resize(count);
-  tbb::parallel_for(std::size_t{0}, sequence.dots.size(), [&](std::size_t i) {
-    sequence.dots[i] =
-        make_dot(curve.implementation(), tone, surface_point_at(curve.mesh(), places[i].triangle, places[i].position_O),
-                 places[i].component);
-  });
-  if (!options.pitch_m) sequence.pitch_m = strata.pitch_m;
   if (report) *report = figures;
   return sequence;
 }

@@ -56,7 +56,7 @@ PlacedStratum measure(const PlacedStrata& strata, std::size_t s, const ToneField
 
 }  // namespace
 
-PlacedStrata place_strata(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
+PlacedStrata place_strata(const CurveMass& mass, const ToneField& tone, const SampleOptions& options,
                           std::uint64_t count, SampleReport& report, const Progress& progress) {
   SampleOptions even = options;
   even.sampler = Sampler::kEven;
@@ -64,17 +64,18 @@ PlacedStrata place_strata(const SurfaceCurve& curve, const ToneField& tone, cons
   even.dot_count = kPlacesAStratum * count;
   even.dot_limit = *even.dot_count;
   PlacedStrata strata;
-  {
-    const DotSequence sequence = place_dots(curve, tone, even, &report, progress);
-    CHECK_EQ(sequence.dots.size(), kPlacesAStratum * count);
-    strata.places.reserve(sequence.dots.size());
-    for (const Dot& dot : sequence.dots) strata.places.push_back({dot.position_O, dot.triangle, dot.component});
-    const double dot_mass_m2 = kPlacesAStratum * sequence.pitch_m * sequence.pitch_m;
-    strata.pitch_m = std::sqrt(dot_mass_m2);
-    strata.strata.resize(count);
-    tbb::parallel_for(std::size_t{0}, strata.strata.size(),
-                      [&](std::size_t s) { strata.strata[s] = measure(strata, s, tone, dot_mass_m2); });
-  }
+  strata.places.reserve(*even.dot_count);
+  stream_dots(
+      mass, even,
+      [&](std::span<const Dot> dots) {
+        for (const Dot& dot : dots) strata.places.push_back({dot.position_O, dot.triangle, dot.component});
+      },
+      &report, progress);
+  CHECK_EQ(strata.places.size(), kPlacesAStratum * count);
+  strata.strata.resize(count);
+  const double dot_mass_m2 = mass.total_m2() / static_cast<double>(count);
+  tbb::parallel_for(std::size_t{0}, strata.strata.size(),
+                    [&](std::size_t s) { strata.strata[s] = measure(strata, s, tone, dot_mass_m2); });
   return strata;
 }
 

@@ -31,7 +31,7 @@ struct PlacedStrata {
 };
 
 /// The strata of `count` dots. `report` gets the figures of the walk, without the path.
-PlacedStrata place_strata(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
+PlacedStrata place_strata(const CurveMass& mass, const ToneField& tone, const SampleOptions& options,
                           std::uint64_t count, SampleReport& report, const Progress& progress);
 
 }  // namespace hilbrush
