@@ -1,0 +1,185 @@
+#include "sampling/fill_holes.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "sampling/gaps/dot_path.h"
+#include "sampling/gaps/gap_meter.h"
+#include "sampling/gaps/square_places.h"
+#include "sampling/gaps/voronoi_places.h"
+#include "sampling/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kLeastGap = .5;
+/// Circles are filled from so much below the limit, so that the sweep, which calls no larger piece covered, finds
+/// little.
+constexpr double kMargin = .03;
+constexpr int kMostRounds = 3;
+/// Steps of the walk from a dot to the middle of a hole: each crosses a dozen triangles.
+constexpr int kMostWalks = 16;
+/// New dots are put next to dots within so many radii of their hole.
+constexpr double kNeighbourhood = 1.6;
+constexpr double kGridPitches = 2;
+/// Triangles are swept in so many blocks, whatever the number of threads.
+constexpr std::size_t kBlocks = 256;
+
+/// Centre of the circle through three points in space; none if they lie in line.
+std::optional<Vector3d> circle_centre(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const Vector3d u = b - a, v = c - a, n = u.cross(v);
+  if (n.squaredNorm() <= 1e-12 * u.squaredNorm() * v.squaredNorm()) return {};
+  return a + (u.squaredNorm() * v.cross(n) + v.squaredNorm() * n.cross(u)) / (2 * n.squaredNorm());
+}
+
+SurfacePoint point_of(const TexturedMesh& mesh, const Dot& dot) {
+  const Vector3d a = mesh.corner(dot.triangle, 0), n = 2 * mesh.area_vector(dot.triangle);
+  const Vector3d u = mesh.corner(dot.triangle, 1) - a, v = mesh.corner(dot.triangle, 2) - a, w = dot.position_O - a;
+  const double f = w.cross(v).dot(n) / n.squaredNorm(), g = u.cross(w).dot(n) / n.squaredNorm();
+  return {dot.triangle, {1 - f - g, f, g}};
+}
+
+double darkest_at(const ToneField& tone, const TexturedMesh& mesh, const std::vector<Dot>& dots) {
+  double darkest = 1e-6;
+  for (const Dot& dot : dots) darkest = std::max(darkest, tone.asked(point_of(mesh, dot)));
+  return darkest;
+}
+
+class HoleFilling {
+ public:
+  HoleFilling(const SurfaceCurve::Implementation& curve, const ToneField& tone, const DotSequence& sequence,
+              double limit_m)
+      : curve_(curve),
+        tone_(tone),
+        dots_(sequence.dots),
+        squares_(curve),
+        grid_(dots_, kGridPitches * sequence.pitch_m),
+        path_(dots_),
+        meter_(curve, tone, grid_, limit_m, darkest_at(tone, curve.mesh, dots_)) {}
+
+  /// One Voronoi diagram for each square; returns how many dots it has brought.
+  std::uint64_t fill_circles() {
+    std::vector<GapMeter::Hole> holes;
+    for (std::uint32_t s = 0; s < curve_.sheets.size(); ++s) {
+      if (curve_.sheets[s].kind == SheetKind::kHilbertCube) continue;
+      auto found = holes_on(s);
+      holes.insert(holes.end(), found.begin(), found.end());
+    }
+    std::stable_sort(holes.begin(), holes.end(), [](const auto& a, const auto& b) { return a.size > b.size; });
+    std::uint64_t added = 0;
+    for (const GapMeter::Hole& hole : holes) added += fill(hole.point, slack_at(hole.point));
+    return added;
+  }
+
+  /// Proves all surface covered, or adds a dot.
+  std::uint64_t sweep() {
+    const std::size_t triangles = curve_.mesh.triangle_count();
+    std::vector<std::vector<GapMeter::Suspect>> suspects(kBlocks);
+    tbb::parallel_for(std::size_t{0}, kBlocks, [&](std::size_t block) {
+      for (std::size_t t = block * triangles / kBlocks; t < (block + 1) * triangles / kBlocks; ++t)
+        meter_.find_suspects(static_cast<std::uint32_t>(t), suspects[block]);
+    });
+    std::uint64_t added = 0;
+    for (const auto& of_block : suspects)
+      for (const GapMeter::Suspect& suspect : of_block) added += fill(suspect.point, suspect.radius_m);
+    return added;
+  }
+
+  std::vector<Dot> take_dots() { return path_.in_order(); }
+
+ private:
+  double slack_at(const SurfacePoint& point) const {
+    const double asked = tone_.asked(point);
+    return asked > 0 ? kMargin * meter_.limit_m() / std::sqrt(asked) : 0;
+  }
+
+  /// Adds a dot in the middle of the hole around a point, if there still is one.
+  bool fill(const SurfacePoint& point, double slack_m) {
+    const GapMeter::Hole hole = meter_.hole_at(point, slack_m);
+    if (!(hole.size > 0)) return false;
+    const Dot dot = make_dot(curve_, tone_, point, squares_.component(point.triangle));
+    const auto nearby = grid_.within(dot.position_O, dot.normal_O, kNeighbourhood * hole.radius_m);
+    dots_.push_back(dot);
+    path_.insert_last(nearby);
+    grid_.add(static_cast<std::uint32_t>(dots_.size() - 1));
+    return true;
+  }
+
+  std::vector<GapMeter::Hole> holes_on(std::uint32_t sheet) const {
+    std::vector<std::uint32_t> members;
+    std::vector<Vector2d> places;
+    for (std::uint32_t i = 0; i < dots_.size(); ++i) {
+      const auto place = squares_.place(point_of(curve_.mesh, dots_[i]));
+      if (!place || place->sheet != sheet) continue;
+      members.push_back(i);
+      places.push_back(place->place);
+    }
+    const auto triples = voronoi_triples(places, curve_.sheets[sheet].square_count);
+    std::vector<GapMeter::Hole> holes(triples.size());
+    tbb::parallel_for(std::size_t{0}, triples.size(), [&](std::size_t i) {
+      holes[i] = hole_between(members[triples[i][0]], members[triples[i][1]], members[triples[i][2]]);
+    });
+    std::erase_if(holes, [](const auto& hole) { return !(hole.size > 0); });
+    return holes;
+  }
+
+  /// The hole in the middle of three dots, judged in space.
+  GapMeter::Hole hole_between(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+    const auto centre = circle_centre(dots_[a].position_O, dots_[b].position_O, dots_[c].position_O);
+    if (!centre) return {};
+    const double radius = (*centre - dots_[a].position_O).norm();
+    if (radius < (1 - kMargin) * meter_.strictest_m()) return {};
+    SurfacePoint point = point_of(curve_.mesh, dots_[std::min({a, b, c})]);
+    double distance = (position(curve_.mesh, point) - *centre).norm();
+    for (int walk = 0; walk < kMostWalks; ++walk) {
+      const SurfacePoint next = walk_towards(curve_.mesh, curve_.neighbours, point, *centre);
+      const double nearer = (position(curve_.mesh, next) - *centre).norm();
+      if (!(nearer < distance)) break;
+      point = next;
+      distance = nearer;
+    }
+    return meter_.hole_at(point, slack_at(point));
+  }
+
+  const SurfaceCurve::Implementation& curve_;
+  const ToneField& tone_;
+  std::vector<Dot> dots_;
+  SquarePlaces squares_;
+  DotGrid grid_;
+  DotPath path_;
+  GapMeter meter_;
+};
+
+}  // namespace
+
+DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots, double largest_gap_pitches,
+                       FillReport* report, const Progress& progress) {
+  if (!(largest_gap_pitches >= kLeastGap))
+    throw InputError("largest_gap", "must be at least .5 pitches: a gap that small asks for a dot everywhere");
+  FillReport result;
+  if (!dots.dots.empty()) {
+    HoleFilling filling(curve.implementation(), tone, dots, largest_gap_pitches * dots.pitch_m);
+    for (std::uint64_t added = 1; added > 0 && result.voronoi_rounds < kMostRounds; ++result.voronoi_rounds) {
+      added = filling.fill_circles();
+      result.added += added;
+      if (progress) progress((result.voronoi_rounds + 1.) / (kMostRounds + 1));
+    }
+    result.added_by_sweep = filling.sweep();
+    result.added += result.added_by_sweep;
+    dots.dots = filling.take_dots();
+  }
+  if (progress) progress(1);
+  if (report) *report = result;
+  return dots;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,55 @@
+#include "sampling/gaps/square_places.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Barycentric coordinates of b in a face; all 0 if it has no area in its triangle.
+Vector3d weights_in(const std::array<Vector2d, 3>& corners_b, const Vector2d& b) {
+  const Vector2d o = corners_b[0], p = corners_b[1] - o, q = corners_b[2] - o, w = b - o;
+  const double area = p.x() * q.y() - p.y() * q.x();
+  if (area == 0) return Vector3d::Zero();
+  const double f = (w.x() * q.y() - w.y() * q.x()) / area, g = (p.x() * w.y() - p.y() * w.x()) / area;
+  return {1 - f - g, f, g};
+}
+
+}  // namespace
+
+SquarePlaces::SquarePlaces(const SurfaceCurve::Implementation& curve) : curve_(curve) {
+  components_.assign(curve.mesh.triangle_count(), 0);
+  first_.assign(curve.mesh.triangle_count() + 1, 0);
+  for (const Sheet& sheet : curve.sheets)
+    for (const SheetFace& face : sheet.faces) {
+      components_[face.triangle] = sheet.component;
+      ++first_[face.triangle + 1];
+    }
+  for (std::size_t t = 1; t < first_.size(); ++t) first_[t] += first_[t - 1];
+  faces_.resize(first_.back());
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  for (std::uint32_t s = 0; s < curve.sheets.size(); ++s)
+    for (std::uint32_t f = 0; f < curve.sheets[s].faces.size(); ++f)
+      faces_[next[curve.sheets[s].faces[f].triangle]++] = {s, f};
+}
+
+std::optional<SquarePlaces::Place> SquarePlaces::place(const SurfacePoint& point) const {
+  const Vector2d b = point.barycentric.tail<2>();
+  std::optional<Place> best;
+  double deepest = -1e300;
+  for (std::uint32_t i = first_[point.triangle]; i < first_[point.triangle + 1]; ++i) {
+    const Sheet& sheet = curve_.sheets[faces_[i].sheet];
+    if (sheet.kind == SheetKind::kHilbertCube) continue;
+    const SheetFace& face = sheet.faces[faces_[i].face];
+    const Vector3d weights = weights_in(sheet.corners_b(face), b);
+    if (weights.minCoeff() <= deepest) continue;
+    deepest = weights.minCoeff();
+    best = {faces_[i].sheet, weights[0] * face.places[0] + weights[1] * face.places[1] + weights[2] * face.places[2]};
+  }
+  return best;
+}
+
+}  // namespace hilbrush

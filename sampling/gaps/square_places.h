@@ -1,0 +1,35 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "sampling/curve/surface_curve.h"
+
+/// Where surface points lie on the unit squares that the curve walks.
+namespace hilbrush {
+
+class SquarePlaces {
+ public:
+  /// Keeps a reference to `curve`. Cost O(triangles), 12 bytes each.
+  explicit SquarePlaces(const SurfaceCurve::Implementation& curve);
+
+  std::uint32_t component(std::uint32_t triangle) const { return components_[triangle]; }
+
+  struct Place {
+    std::uint32_t sheet = 0;
+    Eigen::Vector2d place;  ///< x up to the sheet's number of squares
+  };
+  /// None on a component that has no map.
+  std::optional<Place> place(const SurfacePoint& point) const;
+
+ private:
+  const SurfaceCurve::Implementation& curve_;
+  std::vector<std::uint32_t> components_;
+  /// Faces by triangle: faces_[first_[t]] .. faces_[first_[t + 1]].
+  struct FaceIndex {
+    std::uint32_t sheet = 0, face = 0;
+  };
+  std::vector<std::uint32_t> first_;
+  std::vector<FaceIndex> faces_;
+};
+
+}  // namespace hilbrush
