@@ -65,6 +65,9 @@ std::string run_calibrate(const PipelineRequest& request, const std::filesystem:
                           const PipelineListener& listener) {
   make_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
+  if (calibrated_sampler(request.settings.sampler) != request.settings.sampler)
+    throw InputError("sampler", std::string(sampler_name(request.settings.sampler)) + " paints by the tone curve of " +
+                                    sampler_name(calibrated_sampler(request.settings.sampler)) + ": calibrate that");
   if (listener.on_progress) listener.on_progress("paint", 0);
   const PictureOptions options = picture_options(cell, request.settings);
   const ToneCurve curve = measured.empty() ? simulated_curve(cell, request.settings, options)

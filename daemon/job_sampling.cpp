@@ -26,11 +26,15 @@ double expected_pitch_m(const JobSettings& settings, const TexturedMesh& mesh) {
 
 }  // namespace
 
+Sampler calibrated_sampler(Sampler sampler) {
+  return sampler == Sampler::kFine ? Sampler::kCentroid : sampler;
+}
+
 ToneOptions job_tone_options(const CellDescription& cell, const JobSettings& settings, const TexturedMesh& mesh,
                              std::string& warning) {
   const double pitch_m = expected_pitch_m(settings, mesh);
   ToneOptions options = tone_options(cell,
-                                     {.sampler = sampler_name(settings.sampler),
+                                     {.sampler = sampler_name(calibrated_sampler(settings.sampler)),
                                       .curve = curve_name(settings.curve),
                                       .levels = settings.levels,
                                       .spot_pitches = spot_diameter_m(cell, pitch_m) / pitch_m},
@@ -48,7 +52,13 @@ PictureOptions picture_options(const CellDescription& cell, const JobSettings& s
   options.sample = sample_options(settings);
   options.sample.dot_limit = std::min(options.sample.dot_limit, dot_limit_by_memory());
   options.levels = energy_levels(settings.levels, cell.paint.asked_max);
+  options.curve = settings.curve;
   options.predictive_rounds = settings.predictive_rounds;
+  options.fine_passes = settings.fine_passes;
+  options.spot = [&cell](double pitch_m) -> SpotModel {
+    return {spot_diameter_m(cell, pitch_m) / 2,
+            [response = cell.paint.response](double dose) { return painted_coverage(response, dose); }};
+  };
   return options;
 }
 

@@ -13,7 +13,10 @@ namespace hilbrush {
 ToneOptions job_tone_options(const CellDescription& cell, const JobSettings& settings, const TexturedMesh& mesh,
                              std::string& warning);
 
-/// Placement, levels, rounds and limits of the job.
+/// The sampler whose tone curve this one paints by: fine moves the dots of centroid, and on flat tone moves nothing.
+Sampler calibrated_sampler(Sampler sampler);
+
+/// Placement, levels, rounds and limits of the job. Keeps a reference to `cell`.
 PictureOptions picture_options(const CellDescription& cell, const JobSettings& settings);
 
 /// How many dots fit into the memory that is free, with all that the pipeline keeps for each.

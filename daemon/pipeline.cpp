@@ -21,6 +21,7 @@
 #include "planner/program_check.h"
 #include "planner/program_file.h"
 #include "planner/sha256.h"
+#include "sampling/curvature.h"
 #include "sampling/dots_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/input_error.h"
@@ -115,7 +116,7 @@ struct Workpiece {
 
     auto repaired = stages.run(
         "disk", [&](const Progress&) { return repair_mesh(place_on_table(model, placement_options(settings))); });
-    mesh = std::move(repaired.mesh);
+    mesh = with_curvature_density(std::move(repaired.mesh), settings.density);
     report.mesh.repairs = std::move(repaired.repairs);
     report.mesh.vertices = mesh.vertices.size();
     report.mesh.faces = mesh.triangle_count();

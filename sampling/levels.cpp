@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sampling/check.h"
@@ -33,6 +34,35 @@ double local_energy(const Dot& dot, double pitch_m, const ToneField& asked, cons
   const BoxedPolygon around = frame.clip_box(center - half, center + half);
   const double dots = density.integrate(dot.triangle, around.corners()).mass;
   return dots > 0 ? asked.integrate(dot.triangle, around.corners()).mass / dots : 0;
+}
+
+double nearest_level(std::span<const double> levels, double energy) {
+  return *std::min_element(levels.begin(), levels.end(),
+                           [&](double a, double b) { return std::abs(a - energy) < std::abs(b - energy); });
+}
+
+/// All that is asked for, in dots of energy 1.
+double asked_energy(const ToneField& asked, double pitch_m) {
+  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
+  double mass = 0;
+  for (std::uint32_t t = 0; t < asked.mesh().triangle_count(); ++t) mass += asked.integrate(t, whole).mass;
+  return mass / (pitch_m * pitch_m);
+}
+
+/// Where the tone changes within the box of a dot, its energy is an estimate. What the estimates miss of the total, a
+/// few thousandths, is shared among these dots; those in flat tone have one level exactly and keep it.
+void share_missing_energy(DotSequence& dots, const ToneField& asked, std::span<const double> levels) {
+  constexpr double kFlat = 1e-3;
+  double total = 0;
+  std::vector<std::size_t> estimated;
+  for (std::size_t i = 0; i < dots.dots.size(); ++i) {
+    const double energy = dots.dots[i].level;
+    total += energy;
+    if (std::abs(energy - nearest_level(levels, energy)) > kFlat * energy) estimated.push_back(i);
+  }
+  if (estimated.empty()) return;
+  const double each = (asked_energy(asked, dots.pitch_m) - total) / static_cast<double>(estimated.size());
+  for (const std::size_t i : estimated) dots.dots[i].level += static_cast<float>(each);
 }
 
 }  // namespace
@@ -91,13 +121,10 @@ void assign_levels(DotSequence& dots, const ToneField& asked, const ToneField& d
   tbb::parallel_for(std::size_t{0}, dots.dots.size(), [&](std::size_t i) {
     dots.dots[i].level = static_cast<float>(local_energy(dots.dots[i], dots.pitch_m, asked, density));
   });
+  share_missing_energy(dots, asked, levels);
   double carried = 0;
   for (Dot& dot : dots.dots) {
-    const double wanted = dot.level + carried;
-    const auto above = std::lower_bound(levels.begin(), levels.end(), wanted);
-    double level = above == levels.end() ? levels.back() : *above;
-    if (above != levels.begin() && above != levels.end() && wanted - *(above - 1) < *above - wanted)
-      level = *(above - 1);
+    const double wanted = dot.level + carried, level = nearest_level(levels, wanted);
     carried = wanted - level;
     dot.level = static_cast<float>(level);
   }

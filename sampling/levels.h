@@ -35,8 +35,8 @@ ToneCurve density_curve(const ToneCurve& curve, std::span<const double> levels);
 
 /// Gives each dot its level. `asked` is the field of the coverage asked for, `density` the one the dots were placed by
 /// (its curve from density_curve()). A dot wants the energy asked for around it over the dots that are there; what
-/// rounding to a level leaves is carried on along the curve, so that the energies of any stretch add up to what was
-/// asked within one dot. One thread or many, same levels. Cost: two integrals a dot.
+/// rounding to a level leaves is carried on along the curve: the energies of all dots add up to what was asked, within
+/// one dot. One thread or many, same levels. Cost: two integrals a dot.
 void assign_levels(DotSequence& dots, const ToneField& asked, const ToneField& density, std::span<const double> levels);
 
 }  // namespace hilbrush

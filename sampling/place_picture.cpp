@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
+#include "sampling/laminar.h"
 #include "sampling/levels.h"
 
 namespace hilbrush {
@@ -33,20 +35,30 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
                           const PictureOptions& options, const PicturePredictor& predict, PictureReport* report,
                           const Progress& progress) {
   PictureReport figures;
-  // The places of a loop of n rounds are n + 1; each tells its own share of the progress.
-  int placed = 0;
-  const auto place = [&](const ToneField& density) {
-    const double begin = placed, count = options.predictive_rounds + 1;
-    ++placed;
-    const auto part = [&](double fraction) {
-      if (progress) progress((begin + fraction) / count);
+  SampleOptions sample = options.sample;
+  const bool is_fine = sample.sampler == Sampler::kFine;
+  if (is_fine) sample.sampler = Sampler::kCentroid;
+  // n rounds place n + 1 times; each tells its own share of the progress, and so does the search.
+  const double parts = options.predictive_rounds + 1 + (is_fine ? 1 : 0);
+  int part = 0;
+  const auto next_part = [&]() -> Progress {
+    const double begin = part++ / parts;
+    return [&progress, begin, parts](double fraction) {
+      if (progress) progress(begin + fraction / parts);
     };
-    return place_dots(curve, density, options.sample, &figures.path, part);
+  };
+  const auto place = [&](const ToneField& density) {
+    return options.curve == CurveKind::kLaminar
+               ? place_laminar(curve.mesh(), density, sample, &figures.path, next_part())
+               : place_dots(curve, density, sample, &figures.path, next_part());
   };
   const std::optional<ToneField> density = density_field(tone, tone_options, options.levels);
   const PredictiveOptions predictive{.rounds = options.predictive_rounds, .levels = options.levels};
   DotSequence dots = place_predictively(tone, density ? *density : tone, tone_options.curve, predictive, place, predict,
                                         &figures.predictive);
+  if (is_fine && !dots.dots.empty())
+    dots = refine_dots(curve, tone, std::move(dots), options.spot(dots.pitch_m), {.passes = options.fine_passes},
+                       next_part());
   figures.dots_of_level = count_levels(dots, options.levels);
   if (report) *report = std::move(figures);
   return dots;

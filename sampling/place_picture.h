@@ -1,20 +1,24 @@
 #pragma once
-#include <optional>
+#include <functional>
 #include <vector>
 
+#include "sampling/fine.h"
 #include "sampling/predictive_loop.h"
 #include "sampling/sample.h"
 
-/// From a picture on a surface to dots, with everything that an operator may choose: placement, levels of energy, the
-/// predictive loop. place_dots() and the others do one thing each; this strings them together in the one order that
-/// makes sense:
-///   place by density -> levels -> (predict the picture, ask again: predictive_loop.h)
+/// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of
+/// energy, the predictive loop, the search on the finished dots. place_dots() and the others do one thing each; this
+/// strings them together in the one order that makes sense:
+///   place by density -> levels -> (predict the picture, ask again: predictive_loop.h) -> fine (fine.h)
 namespace hilbrush {
 
 struct PictureOptions {
-  SampleOptions sample;
+  SampleOptions sample;  ///< kFine places as kCentroid
+  CurveKind curve = CurveKind::kHilbert;
   std::vector<double> levels = {1};  ///< see energy_levels()
   int predictive_rounds = 0;
+  int fine_passes = 24;                                ///< of kFine
+  std::function<SpotModel(double pitch_m)> spot = {};  ///< of kFine
 };
 
 struct PictureReport {
@@ -24,7 +28,7 @@ struct PictureReport {
 };
 
 /// `tone` says what is asked for, `curve` and `tone_options` what it was made with. `predict` is called only if there
-/// are predictive rounds. Deterministic. @throws InputError as place_dots().
+/// are predictive rounds. `curve` is not walked by laminar slices. Deterministic. @throws InputError as place_dots().
 DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, const ToneOptions& tone_options,
                           const PictureOptions& options, const PicturePredictor& predict,
                           PictureReport* report = nullptr, const Progress& progress = {});

@@ -18,10 +18,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kTexelPitches = .5;  ///< between texels of what is asked
-constexpr double kErrorPitches = 1;   ///< between places where the error is read: it is smooth over a pitch
-/// The inverse of an asked texel and a wanted tone may not agree by more than this in a round.
-constexpr double kMostCorrection = 1;
+constexpr double kTexelPitches = .5;   ///< between texels of what is asked
+constexpr double kErrorPitches = 1;    ///< between places where the error is read: it is smooth over a pitch
+constexpr double kMostCorrection = 1;  ///< of a wanted tone, in either direction
 /// The atlas repeats the mass of each triangle; beyond this it would only amplify rounding.
 constexpr double kMostRescaling = 2;
 
@@ -170,6 +169,49 @@ class AskedTexels {
   std::vector<float> texels_;
 };
 
+/// The heaviest spot of what is asked for in a box of the triangle, by halving it towards its mass; none if the box is
+/// blank.
+std::optional<SurfacePoint> point_with_tone(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
+                                            Vector2d low, Vector2d high) {
+  constexpr int kMostHalvings = 40;
+  ToneIntegral integral = asked.integrate(triangle, frame.clip_box(low, high).corners());
+  for (int halving = 0; halving < kMostHalvings && integral.mass > 0; ++halving) {
+    const Vector2d b = integral.first / integral.mass;
+    const SurfacePoint centre{triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
+    if (asked.asked(centre) > 0) return centre;
+    const int axis = halving % 2;
+    const double middle = .5 * (low[axis] + high[axis]);
+    Vector2d lower_high = high, upper_low = low;
+    lower_high[axis] = upper_low[axis] = middle;
+    const ToneIntegral lower = asked.integrate(triangle, frame.clip_box(low, lower_high).corners());
+    const ToneIntegral upper = asked.integrate(triangle, frame.clip_box(upper_low, high).corners());
+    (lower.mass > upper.mass ? high : low) = lower.mass > upper.mass ? lower_high : upper_low;
+    integral = lower.mass > upper.mass ? lower : upper;
+  }
+  return std::nullopt;
+}
+
+/// Between texels the atlas is interpolated, so a dot may come to lie up to a texel outside what is asked for: it goes
+/// back.
+void return_strays(DotSequence& dots, const ToneField& asked) {
+  const TexturedMesh& mesh = asked.mesh();
+  tbb::parallel_for(std::size_t{0}, dots.dots.size(), [&](std::size_t i) {
+    Dot& dot = dots.dots[i];
+    const SurfacePoint point = surface_point(mesh, dot.triangle, dot.position_O);
+    if (asked.asked(point) > 0) return;
+    const TriangleFrame frame(mesh, dot.triangle);
+    const Vector2d place = frame.place(point.barycentric);
+    for (double reach_m = kTexelPitches * dots.pitch_m; reach_m < 8 * dots.pitch_m; reach_m *= 2) {
+      const Vector2d reach = Vector2d::Constant(reach_m);
+      const auto toned = point_with_tone(asked, frame, dot.triangle, place - reach, place + reach);
+      if (!toned) continue;
+      dot.position_O = position(mesh, *toned);
+      dot.tone = static_cast<float>(asked.wanted(*toned));
+      return;
+    }
+  });
+}
+
 ToneField field_of(const ToneField& base, const AtlasLayout& layout, std::vector<float> tones) {
   return {base, {layout, ToneLayer(layout.width(), layout.height(), std::move(tones))}};
 }
@@ -194,14 +236,11 @@ DotSequence place_predictively(const ToneField& asked, const ToneField& density,
     if (report) report->error_rms.push_back(rms);
     std::vector<float> tones = texels.corrected(correction);
     const ToneField corrected = field_of(asked, texels.layout(), tones);
-    if (options.levels.size() < 2) {
-      dots = place(corrected);
-    } else {
-      for (float& tone : tones) tone = static_cast<float>(dots_for(options.levels, tone));
-      const ToneField corrected_density = field_of(asked, texels.layout(), std::move(tones));
-      dots = place(corrected_density);
-      assign_levels(dots, corrected, corrected_density, options.levels);
-    }
+    for (float& tone : tones) tone = static_cast<float>(dots_for(options.levels, tone));
+    const ToneField corrected_density = field_of(asked, texels.layout(), std::move(tones));
+    dots = place(corrected_density);
+    return_strays(dots, asked);
+    assign_levels(dots, corrected, corrected_density, options.levels);
   }
   return dots;
 }

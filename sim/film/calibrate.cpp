@@ -19,10 +19,11 @@ constexpr double kFieldWidth = 137, kFieldHeight = 91;
 /// What is not read along the border, in pitches: light is lost over the edge.
 constexpr double kFieldBorder = 4;
 
-/// A flat black field, whose tone curve then asks for whatever coverage a step needs.
+/// A flat black field, upright (laminar slices paint nothing that lies), whose tone curve then asks for whatever
+/// coverage a step needs.
 TexturedMesh black_field(double width_m, double height_m) {
   TexturedMesh field;
-  field.vertices = {{0, 0, 0}, {width_m, 0, 0}, {width_m, height_m, 0}, {0, height_m, 0}};
+  field.vertices = {{0, 0, 0}, {width_m, 0, 0}, {width_m, 0, height_m}, {0, 0, height_m}};
   field.triangles = {{0, 1, 2}, {0, 2, 3}};
   field.corner_uv.resize(2, {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
   field.corner_luminance.resize(2, {0.f, 0.f, 0.f});
