@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -16,8 +17,10 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// Steps of a dot, in pitches, in the first and after the last pass.
+/// Steps of a dot, in pitches: they shrink from the first length to the last, as half a wave.
 constexpr float kFirstStep = .4f, kLastStep = .02f;
+/// It takes so many passes to find out how steep it is; until then steps are shorter.
+constexpr int kWarmUp = 4;
 /// How long a dot remembers which way it went, and how steep it was.
 constexpr float kMomentum = .8f, kSteepness = .95f;
 /// Dots whose gradient is below this share of the common one hardly need to move.
@@ -52,7 +55,8 @@ class Descent {
     if (!(common2 > 0)) return;
     const float done = static_cast<float>(pass) / static_cast<float>(passes);
     const float length =
-        pitch_m_ * (kLastStep + (kFirstStep - kLastStep) * .5f * (1 + std::cos(std::numbers::pi_v<float> * done)));
+        pitch_m_ * std::min(1.f, static_cast<float>(pass + 1) / kWarmUp) *
+        (kLastStep + (kFirstStep - kLastStep) * .5f * (1 + std::cos(std::numbers::pi_v<float> * done)));
     // Both memories begin empty.
     const float motion_share = 1 - std::pow(kMomentum, static_cast<float>(pass + 1)),
                 steepness_share = 1 - std::pow(kSteepness, static_cast<float>(pass + 1));
