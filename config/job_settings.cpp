@@ -60,10 +60,12 @@ void read_sampling(JsonObject& json, JobSettings& settings) {
   };
   settings.levels = small("levels", 1, kLevelsMax, settings.levels);
   settings.predictive_rounds = small("predictive_rounds", 0, 4, settings.predictive_rounds);
-  settings.largest_gap_pitches = json.optional_number("largest_gap_pitches", {1, 100});
+  settings.largest_gap_pitches = json.optional_number("largest_gap_pitches", {.7, 100});
   settings.fine_passes = small("fine_passes", 1, 1000, settings.fine_passes);
   if (const auto choice = json.optional_choice("tone_curve", kToneMappingNames))
     settings.tone_curve = static_cast<ToneMapping>(*choice);
+  if (settings.largest_gap_pitches && settings.dots)
+    json.refuse("largest_gap_pitches", "contradicts dots: filling holes adds to their number");
   if (settings.curve != CurveKind::kLaminar) return;
   if (settings.sampler != Sampler::kCentroid)
     json.refuse("sampler", "laminar slices place their dots in one way only: leave sampler out");

@@ -54,6 +54,7 @@ PictureOptions picture_options(const CellDescription& cell, const JobSettings& s
   options.levels = energy_levels(settings.levels, cell.paint.asked_max);
   options.curve = settings.curve;
   options.predictive_rounds = settings.predictive_rounds;
+  options.largest_gap_pitches = settings.largest_gap_pitches;
   options.fine_passes = settings.fine_passes;
   options.spot = [&cell](double pitch_m) -> SpotModel {
     return {spot_diameter_m(cell, pitch_m) / 2,

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
 
 #include "sampling/input_error.h"
 
@@ -64,6 +65,32 @@ Json mesh_json(const Report::Mesh& mesh) {
           {"warnings", mesh.warnings}};
 }
 
+/// The largest components, with their own stretch of the path.
+Json components_json(const std::vector<ComponentReport>& components, const std::vector<ComponentPath>& paths) {
+  constexpr std::size_t kMostListed = 32;
+  std::vector<std::size_t> order(components.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return components[a].area_m2 > components[b].area_m2; });
+  order.resize(std::min(order.size(), kMostListed));
+  Json list = Json::array();
+  for (const std::size_t i : order) {
+    const ComponentReport& component = components[i];
+    Json entry{{"triangles", component.triangle_count},
+               {"genus", component.genus >= 0 ? Json(component.genus) : Json(nullptr)},
+               {"boundary_loops", component.boundary_loops},
+               {"area_mm2", figure(component.area_m2 * 1e6)},
+               {"order", component.is_mapped ? "square map" : "3D Hilbert"}};
+    if (!component.order_reason.empty()) entry["reason"] = component.order_reason;
+    if (i < paths.size()) {
+      entry["path_length_mm"] = figure(paths[i].path_length_m * 1e3);
+      entry["path_constant"] = figure(paths[i].path_constant);
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
 Json dots_json(const DotCounts& dots) {
   return {{"requested", dots.requested}, {"placed", dots.placed},       {"exposed", dots.exposed},
           {"in_doubt", dots.in_doubt},   {"remaining", dots.remaining}, {"skipped", dots.skipped}};
@@ -118,6 +145,9 @@ std::string report_to_json(const Report& report) {
   json["path"] = {{"length_mm", figure(path.path_length_m * 1e3)},
                   {"constant", figure(path.path_constant)},
                   {"patches", path.patch_count}};
+  json["path"]["patches_at_depth"] = path.patches_at_depth;
+  json["components"] = components_json(report.mesh.components, path.components);
+  json["filled"] = report.picture.filled.added;
   json["levels"] = report.picture.dots_of_level;
   json["predictive"] = predictive_json(report.picture.predictive);
   if (report.fidelity) {

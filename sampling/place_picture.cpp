@@ -48,9 +48,11 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
     };
   };
   const auto place = [&](const ToneField& density) {
-    return options.curve == CurveKind::kLaminar
-               ? place_laminar(curve.mesh(), density, sample, &figures.path, next_part())
-               : place_dots(curve, density, sample, &figures.path, next_part());
+    if (options.curve == CurveKind::kLaminar)
+      return place_laminar(curve.mesh(), density, sample, &figures.path, next_part());
+    DotSequence dots = place_dots(curve, density, sample, &figures.path, next_part());
+    if (!options.largest_gap_pitches) return dots;
+    return fill_holes(curve, density, std::move(dots), *options.largest_gap_pitches, &figures.filled);
   };
   const std::optional<ToneField> density = density_field(tone, tone_options, options.levels);
   const PredictiveOptions predictive{.rounds = options.predictive_rounds, .levels = options.levels};

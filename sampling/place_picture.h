@@ -1,7 +1,9 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <vector>
 
+#include "sampling/fill_holes.h"
 #include "sampling/fine.h"
 #include "sampling/predictive_loop.h"
 #include "sampling/sample.h"
@@ -9,7 +11,7 @@
 /// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of
 /// energy, the predictive loop, the search on the finished dots. place_dots() and the others do one thing each; this
 /// strings them together in the one order that makes sense:
-///   place by density -> levels -> (predict the picture, ask again: predictive_loop.h) -> fine (fine.h)
+///   place by density -> fill holes -> levels -> (predict the picture, ask again: predictive_loop.h) -> fine (fine.h)
 namespace hilbrush {
 
 struct PictureOptions {
@@ -17,6 +19,7 @@ struct PictureOptions {
   CurveKind curve = CurveKind::kHilbert;
   std::vector<double> levels = {1};  ///< see energy_levels()
   int predictive_rounds = 0;
+  std::optional<double> largest_gap_pitches = {};      ///< see fill_holes.h; not for laminar slices
   int fine_passes = 24;                                ///< of kFine
   std::function<SpotModel(double pitch_m)> spot = {};  ///< of kFine
 };
@@ -24,6 +27,7 @@ struct PictureOptions {
 struct PictureReport {
   SampleReport path;
   PredictiveReport predictive;
+  FillReport filled;
   std::vector<std::uint64_t> dots_of_level;  ///< as many as there are levels
 };
 

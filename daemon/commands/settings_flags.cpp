@@ -58,7 +58,7 @@ void SettingsFlags::add_to(CLI::App& command) {
       ->group(group);
   command
       .add_option("--largest-gap-pitches", largest_gap_pitches,
-                  "fill holes between dots that are wider than this many pitches, 1 to 100 (default: none)")
+                  "fill holes between dots that are wider than this many pitches, 0.7 to 100 (default: none)")
       ->group(group);
   command
       .add_option("--tone-curve", tone_curve,

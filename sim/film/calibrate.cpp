@@ -102,7 +102,7 @@ double asked_for(const std::vector<WedgeStep>& steps, double wanted, double aske
 Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOptions& options) {
   return [&cell, pitch_m, options](const std::vector<double>& asked) {
     const TexturedMesh field = black_field(kFieldWidth * pitch_m, kFieldHeight * pitch_m);
-    const SurfaceCurve curve(field);
+    const SurfaceCurve curve(field, options.curve == CurveKind::kLaminar ? CurveKind::kHilbert : options.curve);
     std::vector<WedgeStep> steps;
     for (const double coverage : asked)
       steps.push_back({coverage, coverage > 0 ? paint_step(cell, pitch_m, options, field, curve, coverage) : 0.});
