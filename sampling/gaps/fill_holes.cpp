@@ -42,7 +42,8 @@ std::optional<Vector3d> circle_centre(const Vector3d& a, const Vector3d& b, cons
 }
 
 SurfacePoint point_of(const TexturedMesh& mesh, const Dot& dot) {
-  const Vector3d a = mesh.corner(dot.triangle, 0), n = 2 * mesh.area_vector(dot.triangle);
+  const Vector3d& a = mesh.corner(dot.triangle, 0);
+  const Vector3d n = 2 * mesh.area_vector(dot.triangle);
   const Vector3d u = mesh.corner(dot.triangle, 1) - a, v = mesh.corner(dot.triangle, 2) - a, w = dot.position_O - a;
   const double f = w.cross(v).dot(n) / n.squaredNorm(), g = u.cross(w).dot(n) / n.squaredNorm();
   return {dot.triangle, {1 - f - g, f, g}};

@@ -213,7 +213,8 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   CHECK_EQ(sequence.dots.size(), count);
   if (report) {
     report->path_length_m = path_length(sequence.dots);
-    report->path_constant = report->path_length_m / std::sqrt(static_cast<double>(count) * painted_area(mesh, tone));
+    report->painted_area_m2 = painted_area(mesh, tone);
+    report->path_constant = report->path_length_m / std::sqrt(static_cast<double>(count) * report->painted_area_m2);
     report->patch_count = slices.piece_count();
   }
   return sequence;

@@ -30,6 +30,11 @@ struct Node {
            static_cast<double>(side_count);
   }
   Eigen::Vector2d centre_uv() const { return uv(.5, .5); }
+  /// The place of grid[k].
+  Eigen::Vector2d grid_uv(unsigned k) const {
+    const unsigned column = k % 3, row = k / 3;
+    return uv(.5 * column, .5 * row);
+  }
 };
 
 template <class Quad>
@@ -96,7 +101,7 @@ class AdaptiveCurve {
     if (node.depth < rule_.minimum_depth) return true;
     if (node.depth >= rule_.maximum_depth) return false;
     if (!node.has_grid) {
-      for (unsigned k = 0; k < 9; ++k) node.grid[k] = surface_.position(node.uv(.5 * (k % 3), .5 * (k / 3)));
+      for (unsigned k = 0; k < 9; ++k) node.grid[k] = surface_.position(node.grid_uv(k));
       node.has_grid = true;
     }
     double reach2 = 0;

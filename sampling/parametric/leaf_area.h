@@ -16,9 +16,7 @@ inline double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
 /// (b) Of the leaf's four corners, as two triangles.
 template <class Quad>
 double square_area(const ParametricSurface& surface, const Node<Quad>& leaf) {
-  const auto corner = [&](unsigned k) {
-    return leaf.has_grid ? leaf.grid[k] : surface.position(leaf.uv(.5 * (k % 3), .5 * (k / 3)));
-  };
+  const auto corner = [&](unsigned k) { return leaf.has_grid ? leaf.grid[k] : surface.position(leaf.grid_uv(k)); };
   const Eigen::Vector3d a = corner(0), b = corner(2), c = corner(8), d = corner(6);
   return triangle_area(a, b, c) + triangle_area(a, c, d);
 }

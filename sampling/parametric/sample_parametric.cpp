@@ -4,12 +4,10 @@
 #include <cmath>
 
 #include "sampling/check.h"
-#include "sampling/curve/hilbert.h"
-#include "sampling/curve/peano.h"
+#include "sampling/curve/curve_moment.h"
 #include "sampling/curve/sequence.h"
 #include "sampling/input_error.h"
 #include "sampling/parametric.h"
-#include "sampling/parametric/along_quad.h"
 #include "sampling/parametric/leaf_area.h"
 
 namespace hilbrush {
@@ -153,7 +151,7 @@ class Sampling {
 
   Vector2d place_in(const NodeOf& leaf, double share) const {
     if (options_.snaps_to_vertices) return leaf.centre_uv();
-    const Vector2d place = place_along(leaf.quad, share);
+    const Vector2d place = curve_place(leaf.quad, share);
     return leaf.uv(place.x(), place.y());
   }
 
@@ -228,7 +226,7 @@ class Sampling {
       while (true) {
         const double to = std::clamp(end_of(current.index), from, after);
         const double share = (to - before) / (after - before);
-        const Vector2d moment = to < after ? moment_along(leaf.quad, share) : moment_along(leaf.quad, 1.);
+        const Vector2d moment = to < after ? curve_moment(leaf.quad, share) : curve_moment(leaf.quad, 1.);
         current.mass += to - from;
         const double weight = (to - from) / (after - before);
         const Vector2d offset = weight * Vector2d(static_cast<double>(leaf.x), static_cast<double>(leaf.y));

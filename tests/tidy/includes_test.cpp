@@ -28,7 +28,8 @@ constexpr const char* kPosix =
 const LibraryRule kRules[]{
     {"sampling_images", "sampling/images/.*", "sampling/[^/]+\\.h|sampling/images/.*",
      "OpenImageIO/.*|Eigen/.*|zlib\\.h"},
-    {"sampling", "sampling/.*", "sampling/([^/]+|(files|vrml|tone|disk|curve|parametric|quality)/.*)\\.h",
+    {"sampling", "sampling/.*",
+     "sampling/([^/]+|(files|vrml|tone|disk|curve|parametric|laminar|gaps|relax|quality)/.*)\\.h",
      "(unsupported/)?Eigen/.*|OpenMesh/.*|tbb/.*|oneapi/.*|zlib\\.h|boost/polygon/.*|metis\\.h"},
     {"cell_model", "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.(h|cpp)",
      "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.h", "Eigen/.*"},
