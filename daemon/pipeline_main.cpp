@@ -12,6 +12,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/pipeline.h"
+#include "daemon/quality/quality.h"
 #include "planner/program_file.h"
 #include "sampling/input_error.h"
 
@@ -44,6 +45,7 @@ class ProgressLines {
 
 struct Arguments {
   std::string model, settings_json = "{}", cell, output, program, emissions, measured;
+  std::string request_json;
   bool wedge = false;
   std::vector<double> from;
   std::size_t next = 0;
@@ -64,6 +66,8 @@ Json run(const std::string& command, const Arguments& arguments, const PipelineL
     for (const auto& file : run_files(arguments.model)) files.push_back(file.string());
     return {{"files", files}};
   }
+  if (command == "quality")
+    return Json::parse(run_quality(quality_request_from_json(arguments.request_json), arguments.output, listener));
   const PipelineRequest request = request_of(arguments);
   if (command == "plan") return Json::parse(run_plan(request, listener));
   if (command == "dry-run") return Json::parse(run_dry_run(request, listener));
@@ -115,7 +119,7 @@ int main(int argc, char** argv) {
   const auto add = [&](const char* name, const char* what, bool has_model, bool has_output) {
     CLI::App* command = app.add_subcommand(name, what);
     if (has_model) command->add_option("--model", arguments.model, "model file")->required();
-    if (std::string(name) != "files") {
+    if (std::string(name) != "files" && std::string(name) != "quality") {
       command->add_option("--settings-json", arguments.settings_json, "job settings, a JSON object");
       command->add_option("--cell", arguments.cell, "cell file or name (default: the settings' cell)");
     }
@@ -131,6 +135,9 @@ int main(int argc, char** argv) {
   CLI::App* calibrate = add("calibrate", "make a tone curve from a grey wedge", false, true);
   auto* measured = calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
   calibrate->add_flag("--wedge", arguments.wedge, "write a wedge to paint and measure")->excludes(measured);
+  add("quality", "measure how evenly dots lie", false, true)
+      ->add_option("--request-json", arguments.request_json, "what to measure, a JSON object")
+      ->required();
   CLI::App* approach = add("approach", "plan the way from measured joints to an exposure", true, false);
   approach->add_option("--program", arguments.program, "program file")->required();
   approach->add_option("--next", arguments.next, "index of the exposure to reach")->required();

@@ -107,6 +107,7 @@ int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal) 
   app.footer(std::string("`hilbrush COMMAND --help` explains one command.\n") + kFooter);
   try {
     add_pipeline_commands(app, context);
+    add_quality_command(app, context);
     add_job_commands(app, context);
     add_cell_commands(app, context);
     add_check_command(app, context);

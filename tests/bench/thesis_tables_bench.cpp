@@ -6,7 +6,6 @@
 // to 5.12 and 6.5) go into the folder.
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <functional>
@@ -22,6 +21,7 @@
 #include "sampling/point_sets.h"
 #include "sampling/quality.h"
 #include "sampling/sample.h"
+#include "tests/bench/answer_hash.h"
 
 namespace {
 
@@ -29,21 +29,6 @@ using namespace hilbrush;
 using Eigen::Vector2d, Eigen::Vector3d;
 
 constexpr double kNone = 0;  ///< the thesis has no figure
-
-/// FNV-1a over the bits of all figures.
-class AnswerHash {
- public:
-  void take(double value) {
-    std::uint64_t bits = 0;
-    static_assert(sizeof bits == sizeof value);
-    std::memcpy(&bits, &value, sizeof bits);
-    for (int i = 0; i < 8; ++i) hash_ = (hash_ ^ (bits >> (8 * i) & 0xff)) * 0x100000001b3u;
-  }
-  std::uint64_t value() const { return hash_; }
-
- private:
-  std::uint64_t hash_ = 0xcbf29ce484222325u;
-};
 
 struct Run {
   std::vector<std::uint64_t> sizes;
@@ -291,7 +276,7 @@ int main(int argc, char** argv) {
     const std::clock_t begin = std::clock();
     run_all(run, meshes);
     std::printf("\nCPU %.1f s, answer %016llx\n", static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC,
-                static_cast<unsigned long long>(run.hash.value()));
+                run.hash.value());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "thesis_tables_bench: %s\n", error.what());
     return 1;

@@ -1,0 +1,127 @@
+#include <algorithm>
+#include <array>
+
+#include "config/job_settings.h"
+#include "daemon/quality/measured_set.h"
+#include "sampling/input_error.h"
+#include "sampling/mesh_repair.h"
+#include "sampling/point_sets.h"
+
+namespace hilbrush {
+namespace {
+
+using Eigen::Vector2d, Eigen::Vector3d;
+
+/// The surface as triangles, `side` by `side` quads.
+TexturedMesh triangles_of(const ParametricSurface& surface, int side) {
+  TexturedMesh mesh;
+  for (int j = 0; j <= side; ++j)
+    for (int i = 0; i <= side; ++i)
+      mesh.vertices.push_back(surface.position(Vector2d(i, j) / static_cast<double>(side)));
+  const auto index = [side](int i, int j) { return static_cast<std::uint32_t>(j * (side + 1) + i); };
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) {
+      mesh.triangles.push_back({index(i, j), index(i + 1, j), index(i + 1, j + 1)});
+      mesh.triangles.push_back({index(i, j), index(i + 1, j + 1), index(i, j + 1)});
+    }
+  const std::size_t count = mesh.triangle_count();
+  mesh.corner_uv.resize(count, {Vector2d::Zero(), Vector2d::Zero(), Vector2d::Zero()});
+  mesh.corner_luminance.resize(count, {0, 0, 0});
+  mesh.material_index.resize(count, 0);
+  mesh.materials.resize(1);
+  return repair_mesh(std::move(mesh)).mesh;
+}
+
+class ParametricSet : public MeasuredSet {
+ public:
+  ParametricSet(const QualityRequest& request, ParametricShape shape) : shape_(shape), formula_(make_surface(shape)) {
+    kind = "surface";
+    options_.sampler = request.sampler.empty() ? Sampler::kCentroid : sampler_named(request.sampler);
+    options_.curve =
+        choice_of(request.curve, {"hilbert", "peano2"}, 0, "$.curve") == 0 ? CurveKind::kHilbert : CurveKind::kPeano2;
+    options_.area = static_cast<AreaMethod>(choice_of(
+        request.area, area_method_names(), static_cast<std::size_t>(AreaMethod::kFirstFundamentalForm), "$.area"));
+    options_.density =
+        static_cast<ParametricDensity>(choice_of(request.density, parametric_density_names(), 0, "$.density"));
+    options_.seed = request.seed;
+    if (!request.points.empty()) take_rival(request);
+    // A sphere's triangles are off by 1.5e-4 of its radius; the plane needs no more than two.
+    mesh_ = triangles_of(*formula_, shape == ParametricShape::kPlane ? 1 : 128);
+    if (options_.density == ParametricDensity::kConstant)
+      surface_.emplace(mesh_);
+    else
+      notes.emplace_back("the density varies over the surface: the dots are shown, but not held against it");
+    if (shape != ParametricShape::kPlane && surface_)
+      notes.push_back("balls, spectrum and spacing are measured on the formula's " +
+                      std::to_string(mesh_.triangle_count()) + " triangles");
+  }
+
+  MeasuredDots place(std::uint64_t count) const override {
+    MeasuredDots placed;
+    if (rival_) {
+      if (shape_ == ParametricShape::kPlane)
+        placed.plane_points = plane_set(*rival_, count, options_.seed);
+      else
+        placed.directions = sphere_set(*rival_, count, options_.seed);
+      for (const Vector2d& p : placed.plane_points) placed.dots.push_back(dot_at({p.x(), p.y(), 0}));
+      for (const Vector3d& p : placed.directions) placed.dots.push_back(dot_at(p));
+      return placed;
+    }
+    ParametricOptions options = options_;
+    options.dot_count = count;
+    for (const ParametricDot& dot : sample_parametric(*formula_, options).dots) {
+      if (shape_ == ParametricShape::kPlane) placed.plane_points.push_back(dot.uv);
+      if (is_sphere()) placed.directions.push_back(dot.position);
+      placed.dots.push_back(dot_at(dot.position));
+    }
+    return placed;
+  }
+
+  const SurfaceQuality* surface() const override { return surface_ ? &*surface_ : nullptr; }
+  std::vector<std::uint64_t> default_counts() const override { return {10'000}; }
+
+ private:
+  static Sampler sampler_named(const std::string& name) {
+    std::vector<std::string> names;
+    for (int s = 0; s <= static_cast<int>(Sampler::kNiederreiter); ++s)
+      names.emplace_back(sampler_name(static_cast<Sampler>(s)));
+    return static_cast<Sampler>(choice_of(name, names, 0, "$.sampler"));
+  }
+
+  bool is_sphere() const { return shape_ == ParametricShape::kSphere || shape_ == ParametricShape::kEqualAreaSphere; }
+
+  void take_rival(const QualityRequest& request) {
+    if (shape_ != ParametricShape::kPlane && !is_sphere())
+      throw InputError("$.points", "is for the plane and the sphere only");
+    for (const auto& [name, path] : {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
+                                     std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"}})
+      if (!name.empty()) throw InputError(path, "is of no use with points, which are not placed along a curve");
+    rival_ = static_cast<PlaneSet>(choice_of(request.points, plane_set_names(), 0, "$.points"));
+  }
+
+  Dot dot_at(const Vector3d& place) const {
+    Dot dot;
+    dot.position_O = place;
+    dot.normal_O = dot.smooth_normal_O = Eigen::Vector3f::Zero();
+    if (!surface_) return dot;
+    const SurfacePoint point = surface_->nearest(place);
+    dot.triangle = point.triangle;
+    dot.normal_O = dot.smooth_normal_O = face_normal(mesh_, point).cast<float>();
+    return dot;
+  }
+
+  ParametricShape shape_;
+  std::unique_ptr<ParametricSurface> formula_;
+  TexturedMesh mesh_;
+  ParametricOptions options_;
+  std::optional<PlaneSet> rival_;
+  std::optional<SurfaceQuality> surface_;
+};
+
+}  // namespace
+
+std::unique_ptr<MeasuredSet> make_parametric_set(const QualityRequest& request, ParametricShape shape) {
+  return std::make_unique<ParametricSet>(request, shape);
+}
+
+}  // namespace hilbrush
