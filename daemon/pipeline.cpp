@@ -168,7 +168,9 @@ void refuse_faulty_program(const std::vector<ProgramFault>& faults) {
 
 DotSequence sample_dots(Workpiece& piece, Stages& stages) {
   const auto curve = stages.run("curve", [&](const Progress& progress) {
-    return std::make_unique<SurfaceCurve>(piece.mesh, CurveKind::kHilbert, progress);
+    // Laminar slices walk no curve; what the report says of the surface comes from one all the same.
+    const CurveKind kind = piece.settings.curve == CurveKind::kLaminar ? CurveKind::kHilbert : piece.settings.curve;
+    return std::make_unique<SurfaceCurve>(piece.mesh, kind, progress);
   });
   piece.report.mesh.components = curve->components();
   auto dots = stages.run("dots", [&](const Progress& progress) {
