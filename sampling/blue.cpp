@@ -18,10 +18,15 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kChoiceSweeps = 3, kNewtonSweeps = 3;
+/// Two dots nearer than this share of their spacing in the densest packing are pushed apart at last; the kernel, which
+/// is flat on top, leaves a few such pairs in 100,000.
+constexpr double kNearest = .58;
 /// How far Newton steps may take a dot from the place that was chosen, and a single one, in spacings.
 constexpr double kLongestWay = .25, kLongestStep = .15;
 /// Dots whose spacings differ by more do not see each other: what they would push, the surface around them would pull.
 constexpr double kMostUnequal = 4;
+/// Distance of neighbours in the densest packing, at unit area a dot: sqrt(2 / sqrt(3)).
+constexpr double kDensestSpacing = 1.0745699318235418;
 /// Surface pulls from so many places a stratum.
 constexpr std::size_t kPulls = 4;
 
@@ -73,6 +78,10 @@ class Relaxation {
     const std::vector<SurfacePlace> chosen = dots_;
     for (int sweep = 0; sweep < kNewtonSweeps; ++sweep)
       visit_all(progress, kChoiceSweeps + sweep, [&](std::size_t i) { step(i, chosen[i].position_O); });
+  }
+
+  void push_apart(const Progress& progress) {
+    visit_all(progress, kChoiceSweeps + kNewtonSweeps, [&](std::size_t i) { leave_nearest(i); });
   }
 
   const std::vector<SurfacePlace>& dots() const { return dots_; }
@@ -138,7 +147,9 @@ class Relaxation {
     for (const std::uint32_t j : neighbours_[i]) {
       const PairKernel kernel = kernel_of(i, j);
       slope.add(kernel, dots_[j].position_O, 1);
-      add_pulls(slope, kernel, j);
+      // Many a neighbour's surface is out of reach of this one place of the stratum.
+      const double reach = std::sqrt(kernel.support2()) + strata_.strata[j].radius_m;
+      if ((strata_.strata[j].middle_O - here_O).squaredNorm() < reach * reach) add_pulls(slope, kernel, j);
     }
     const double h = strata_.strata[i].spacing_m;
     // Curvatures below a third of a single kernel's are no guide to how far the valley is.
@@ -150,6 +161,22 @@ class Relaxation {
     move_to(dots_[i], curve_, tone_, home_O + from_home);
   }
 
+  void leave_nearest(std::size_t i) {
+    const Vector3d here_O = dots_[i].position_O;
+    double worst = 0;
+    Vector3d away = Vector3d::Zero();
+    for (const std::uint32_t j : neighbours_[i]) {
+      const double least =
+          kNearest * kDensestSpacing * .5 * (strata_.strata[i].spacing_m + strata_.strata[j].spacing_m);
+      const Vector3d way = here_O - dots_[j].position_O;
+      const double distance = way.norm();
+      if (least - distance <= worst || !(distance > 0)) continue;
+      worst = least - distance;
+      away = worst / distance * way;
+    }
+    if (worst > 0) move_to(dots_[i], curve_, tone_, here_O + away);
+  }
+
   template <class Visit>
   void visit_all(const Progress& progress, int sweep, Visit visit) {
     for (const auto& stretches : colouring_.stretches)
@@ -157,7 +184,7 @@ class Relaxation {
         const std::size_t begin = stretches[s] * Colouring::kStretch;
         for (std::size_t i = begin; i < std::min(begin + Colouring::kStretch, dots_.size()); ++i) visit(i);
       });
-    if (progress) progress(.5 + .5 * (sweep + 1) / (kChoiceSweeps + kNewtonSweeps));
+    if (progress) progress(.5 + .5 * (sweep + 1) / (kChoiceSweeps + kNewtonSweeps + 1));
   }
 
   const SurfaceCurve& curve_;
@@ -216,6 +243,7 @@ DotSequence place_blue(const SurfaceCurve& curve, const ToneField& tone, const S
     Relaxation relaxation(curve, tone, strata, options.seed);
     relaxation.choose(progress);
     relaxation.refine(progress);
+    relaxation.push_apart(progress);
     sequence.dots = dots_at(curve, tone, relaxation.dots());
     measure_paths(sequence.dots, figures);
   }

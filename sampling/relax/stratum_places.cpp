@@ -38,16 +38,16 @@ PlacedStratum measure(const PlacedStrata& strata, std::size_t s, const ToneField
   PlacedStratum stratum;
   stratum.spacing_m = std::sqrt(dot_mass_m2 / std::max(asked, 1e-4));
   stratum.open_places = open_places(strata, s, stratum.spacing_m);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
-  for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
-    if (!(stratum.open_places >> p & 1u)) continue;
-    middle += strata.place(s, p).position_O;
-    normal += tone.mesh().area_vector(strata.place(s, p).triangle).normalized();
-  }
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (std::size_t p = 0; p < kPlacesAStratum; ++p)
+    if (stratum.open_places >> p & 1u) middle += strata.place(s, p).position_O;
   stratum.middle_O = middle / std::popcount(stratum.open_places);
-  const int first = std::countr_zero(stratum.open_places);
-  stratum.normal_O = normal.norm() > .1 ? Eigen::Vector3d(normal.normalized())
-                                        : tone.mesh().area_vector(strata.place(s, first).triangle).normalized();
+  const auto normal_of = [&](int p) {
+    return tone.mesh().area_vector(strata.place(s, static_cast<std::size_t>(p)).triangle).normalized();
+  };
+  const Eigen::Vector3d first = normal_of(std::countr_zero(stratum.open_places)),
+                        last = normal_of(std::bit_width(stratum.open_places) - 1);
+  stratum.normal_O = (first + last).norm() > .1 ? Eigen::Vector3d((first + last).normalized()) : first;
   for (std::size_t p = 0; p < kPlacesAStratum; ++p)
     if (stratum.open_places >> p & 1u)
       stratum.radius_m = std::max(stratum.radius_m, (strata.place(s, p).position_O - stratum.middle_O).norm());
