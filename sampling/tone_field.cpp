@@ -28,6 +28,10 @@ double cross(const Vector2d& a, const Vector2d& b) {
 
 /// Opens a triangle that is a line or a point in its texture, by a thousandth of a texel.
 void open_collapsed(std::array<Vector2d, 3>& p) {
+  // Most are as high as wide, and no side is longer than the first two together.
+  const Vector2d u = p[1] - p[0], v = p[2] - p[0];
+  const double area = std::abs(cross(u, v)), reach = u.lpNorm<1>() + v.lpNorm<1>();
+  if (area >= kLeastTexels * reach && reach >= kLeastTexels) return;
   int apex = 0;
   double longest = -1;
   for (int k = 0; k < 3; ++k) {

@@ -15,11 +15,23 @@ namespace {
 /// Quads that one thread takes at once.
 constexpr std::size_t kGrain = 256;
 
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// m^2 for a unit of the square; infinite where the map has no area.
+double density_on_square(const Sheet& sheet, const TriangleTone& tone, const SheetFace& face) {
+  const auto b = sheet.corners_b(face);
+  const auto& p = face.places;
+  return tone.space() * std::abs(cross(b[1] - b[0], b[2] - b[0]) / cross(p[1] - p[0], p[2] - p[0]));
+}
+
 template <class Curve>
 void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass* pieces) {
   constexpr int kDimensions = kDimensionsOf<Curve>;
   const Sheet& sheet = mass.sheet_of(result);
   const BaseQuad& quad = mass.base_quad(result);
+  result.depth = quad.depth;
   double total = 0, squares = 0;
   for (std::uint32_t i = 0; i < quad.face_count; ++i) {
     const SheetFace& face = sheet.face_of(quad, i);
@@ -35,7 +47,7 @@ void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass*
     total += integral.mass;
     result.moment_O +=
         integral.mass * position(mass.curve.mesh, {face.triangle, {1 - centre.sum(), centre.x(), centre.y()}});
-    if constexpr (kDimensions == 2) squares += integral.square * FaceFrame(sheet, mass.curve.mesh, face).density;
+    if constexpr (kDimensions == 2) squares += integral.square * density_on_square(sheet, tone, face);
   }
   if constexpr (kDimensions == 2)
     if (std::isfinite(squares))

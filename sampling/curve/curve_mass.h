@@ -21,6 +21,7 @@ struct QuadMass {
   std::uint32_t sheet = 0, quad = 0;
   /// Bound on the mass that lies elsewhere than if the quad's were spread evenly over its square.
   float misplaced = std::numeric_limits<float>::infinity();
+  std::uint32_t depth = 0;
   Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times place
 };
 

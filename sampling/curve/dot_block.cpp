@@ -64,18 +64,47 @@ class CentreWriter {
  public:
   CentreWriter(const DotPlan& plan, std::vector<Dot>& dots) : plan_(plan), dots_(dots) {}
 
-  /// A whole base quad.
-  void add_quad(std::size_t index) {
-    const QuadMass& quad = plan_.mass.quads[index];
-    const double mass = plan_.mass.mass_of(index);
-    last_quad_ = index;
-    StratumPart& part = begin_part(quad.sheet);
+  /// Whole base quads, `first` to `last` - 1.
+  void add_quads(std::size_t first, std::size_t last) {
+    const CurveMass::Implementation& mass = plan_.mass;
+    for (std::size_t begin = first; begin < last;) {
+      const std::uint32_t sheet = mass.quads[begin].sheet;
+      StratumPart& part = stratum_.on(sheet);
+      double sum = 0, heaviest = 0;
+      std::size_t heaviest_quad = begin, q = begin;
+      for (; q < last && mass.quads[q].sheet == sheet; ++q) {
+        const double quad_mass = mass.mass_of(q);
+        sum += quad_mass;
+        part.moment_O += mass.quads[q].moment_O;
+        if (quad_mass > heaviest) heaviest = quad_mass, heaviest_quad = q;
+      }
+      if (sum > 0) {
+        last_quad_ = heaviest_quad;
+        part.mass += sum;
+        part.triangle = kNoTriangle;
+        if (heaviest > part.heaviest_mass) {
+          part.heaviest_mass = heaviest;
+          part.heaviest_quad = heaviest_quad;
+          part.first_quad = begin;
+          part.last_quad = q;
+        }
+      }
+      begin = q;
+    }
+  }
+
+  /// Shares of a light base quad's mass.
+  void add_quad(std::size_t quad, double from, double to) {
+    const double mass = (to - from) * plan_.mass.mass_of(quad);
+    last_quad_ = quad;
+    StratumPart& part = stratum_.on(plan_.mass.quads[quad].sheet);
     part.mass += mass;
-    part.moment_O += quad.moment_O;
+    part.moment_O += (to - from) * plan_.mass.quads[quad].moment_O;
     part.triangle = kNoTriangle;
     if (mass <= part.heaviest_mass) return;
     part.heaviest_mass = mass;
-    part.heaviest_quad = index;
+    part.heaviest_quad = part.first_quad = quad;
+    part.last_quad = quad + 1;
   }
 
   template <class Curve>
@@ -90,7 +119,7 @@ class CentreWriter {
 
   void close(std::uint64_t) {
     // Rounding may leave nothing to a stratum at the very end of the curve.
-    if (stratum_.is_empty()) add_quad(last_quad_);
+    if (stratum_.is_empty()) add_quads(last_quad_, last_quad_ + 1);
     const StratumPart& part = stratum_.heaviest();
     dots_.push_back(make_dot(plan_.mass.curve, plan_.mass.tone, centre_on_surface(plan_.mass, part),
                              plan_.mass.curve.sheets[part.sheet].component));

@@ -66,7 +66,11 @@ struct Stretches {
   const std::function<void(std::uint64_t, const Patch&, double, double)>& visit;
   std::uint64_t stratum = 0;
 
-  void add_quad(std::size_t quad) const { visit(stratum, patch_of_quad(mass, quad), 0, 1); }
+  void add_quads(std::size_t first, std::size_t last) const {
+    for (std::size_t q = first; q < last; ++q)
+      if (mass.mass_of(q) > 0) visit(stratum, patch_of_quad(mass, q), 0, 1);
+  }
+  void add_quad(std::size_t quad, double from, double to) const { visit(stratum, patch_of_quad(mass, quad), from, to); }
   template <class Curve>
   void add(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
            double to) const {

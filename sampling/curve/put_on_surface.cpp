@@ -10,7 +10,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kLongestWalk = 12;
+/// Across needles a pitch is many triangles.
+constexpr int kLongestWalk = 64;
 constexpr int kMostHalvings = 40;
 
 /// Barycentric coordinates of the point of a triangle that is nearest to `p` (Ericson, Real-Time Collision

@@ -16,15 +16,13 @@ constexpr std::size_t kMostFacesIfSmall = 64;
 constexpr double kSmallShare = .25;
 /// No quad holds more than one part in so many of the mesh's area, however few its triangles: threads and strata find
 /// their way from base quads, and the walk to a place below one stays short.
-constexpr double kLeastQuads = 16384;
+constexpr double kLeastQuads = 4000;
 /// Division also ends where it would multiply the listed triangles by more than this power of a quad's side: 1.9 with
 /// four children.
 constexpr double kTooManyExponent = .926;
 constexpr int kDeepest = 24;
 /// A sound map lists each face in a few quads.
 constexpr std::size_t kMostListed = 1'000'000, kMostListedPerFace = 60;
-/// Chaining by nearest ends is quadratic.
-constexpr std::size_t kMostChained = 3000;
 /// Rounding may not lose a triangle that touches a quad.
 constexpr double kTouch = 1e-14;
 
@@ -192,20 +190,6 @@ class TreeBuilder {
   std::array<std::vector<std::vector<std::uint32_t>>, kDeepest + 1> levels_;  ///< lists of the children on the way down
 };
 
-template <class Curve>
-Eigen::Vector3d position_of_first_piece(const Sheet& sheet, const BaseQuad& quad, const TexturedMesh& mesh) {
-  constexpr int kDimensions = kDimensionsOf<Curve>;
-  for (std::uint32_t i = 0; i < quad.face_count; ++i) {
-    const SheetFace& face = sheet.face_of(quad, i);
-    auto piece = whole_piece<kDimensions>(sheet, mesh, face);
-    clip_to_box<kDimensions>(piece, quad.low.template head<kDimensions>(), quad.size);
-    if (piece.corner_count < 3) continue;
-    const Vector2d b = piece.corners[0].b;
-    return position(mesh, {face.triangle, {1 - b.x() - b.y(), b.x(), b.y()}});
-  }
-  return mesh.corner(sheet.face_of(quad, 0).triangle, 0);
-}
-
 }  // namespace
 
 template <int kDimensions>
@@ -250,28 +234,9 @@ template void clip_to_box<3>(Piece<3>&, const Eigen::Vector3d&, double);
 bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh) {
   return with_curve(sheet.kind, [&]<class Curve>(Curve) {
     TreeBuilder<Curve>(sheet, mesh).build();
-    if (kDimensionsOf<Curve> == 2 && sheet.face_lists.size() > kMostListed + kMostListedPerFace * sheet.faces.size())
-      return false;
-    if (sheet.base_quads.empty()) return true;
-    sheet.begin_O = position_of_first_piece<Curve>(sheet, sheet.base_quads.front(), mesh);
-    sheet.end_O = position_of_first_piece<Curve>(sheet, sheet.base_quads.back(), mesh);
-    return true;
+    return kDimensionsOf<Curve> == 3 ||
+           sheet.face_lists.size() <= kMostListed + kMostListedPerFace * sheet.faces.size();
   });
-}
-
-std::vector<std::uint32_t> chain_sheets(const std::vector<Sheet>& sheets) {
-  std::vector<std::uint32_t> chain(sheets.size());
-  for (std::uint32_t i = 0; i < chain.size(); ++i) chain[i] = i;
-  if (chain.size() > kMostChained) return chain;
-  for (std::size_t i = 1; i < chain.size(); ++i) {
-    const Eigen::Vector3d& here = sheets[chain[i - 1]].end_O;
-    const auto next = std::min_element(
-        chain.begin() + static_cast<std::ptrdiff_t>(i), chain.end(), [&](std::uint32_t a, std::uint32_t b) {
-          return (sheets[a].begin_O - here).squaredNorm() < (sheets[b].begin_O - here).squaredNorm();
-        });
-    std::iter_swap(chain.begin() + static_cast<std::ptrdiff_t>(i), next);
-  }
-  return chain;
 }
 
 }  // namespace hilbrush

@@ -58,15 +58,11 @@ class StrataCutter {
 
   template <class Walk, class Node>
   void take(const Walk& walk, const Node& node, PatchKind kind) {
-    const double end = node.at + node.mass;
-    double share = 0;
-    while (next_ < end && !is_done()) {
-      const double next = std::clamp((next_ - node.at) / node.mass, share, 1.);
-      if (is_open_) consumer_.add(walk, node, kind, share, next);
-      share = next;
-      pass();
-    }
-    if (is_open_ && !is_done()) consumer_.add(walk, node, kind, share, 1.);
+    cut(node.at, node.mass, [&](double from, double to) { consumer_.add(walk, node, kind, from, to); });
+  }
+  /// A base quad too light to be looked into.
+  void take_quad(std::size_t quad, double at, double mass) {
+    cut(at, mass, [&](double from, double to) { consumer_.add_quad(quad, from, to); });
   }
 
   /// The curve is over: what rounding has left open ends here.
@@ -75,6 +71,18 @@ class StrataCutter {
   }
 
  private:
+  template <class Add>
+  void cut(double at, double mass, Add add) {
+    double share = 0;
+    while (next_ < at + mass && !is_done()) {
+      const double next = std::clamp((next_ - at) / mass, share, 1.);
+      if (is_open_ && next > share) add(share, next);
+      share = next;
+      pass();
+    }
+    if (is_open_ && !is_done() && share < 1) add(share, 1.);
+  }
+
   void pass() {
     if (is_open_) consumer_.close(index_++);
     is_open_ = true;
@@ -166,8 +174,12 @@ class Walks {
       walks_;
 };
 
+/// A base quad with no more than this share of a small patch's mass is cut as it is: where in it matters to nobody.
+inline constexpr double kLightShare = .5;
+
 /// Strata `first` to `last` - 1, told to `consumer` as StrataCutter does, and whole base quads by
-///   void add_quad(std::size_t quad)
+///   void add_quads(std::size_t first, std::size_t last)           `last` not included
+///   void add_quad(std::size_t quad, double from, double to)   shares of its mass
 template <class Consumer>
 void cut_strata(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Consumer& consumer,
                 std::vector<std::size_t>& patches_at_depth) {
@@ -175,14 +187,27 @@ void cut_strata(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Co
   StrataCutter cutter(plan.strata, first, last, consumer);
   CountingSink sink(cutter, patches_at_depth);
   Walks walks(plan);
-  for (std::size_t q = mass.quad_at(plan.strata.begin_of(first)); q < mass.quads.size() && !cutter.is_done(); ++q) {
-    if (!(mass.mass_of(q) > 0)) continue;
-    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before[q], mass.mass_before[q + 1])) {
-      walks.walk(q, sink);
-    } else if (!cutter.is_skipped()) {
-      consumer.add_quad(q);
-      sink.count(mass.base_quad(mass.quads[q]).depth);
+  const std::size_t end = mass.quads.size();
+  for (std::size_t q = mass.quad_at(plan.strata.begin_of(first)); q < end && !cutter.is_done();) {
+    const auto is_walked = [&] {
+      return plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before[q], mass.mass_before[q + 1]);
+    };
+    const std::size_t run = q;
+    while (q < end && !is_walked()) ++q;
+    if (q > run && !cutter.is_skipped()) {
+      consumer.add_quads(run, q);
+      for (std::size_t i = run; i < q; ++i)
+        if (mass.mass_of(i) > 0) sink.count(mass.quads[i].depth);
     }
+    if (q == end) break;
+    const double quad_mass = mass.mass_of(q);
+    if (plan.rule.uniform_depth < 0 && quad_mass <= kLightShare * plan.rule.small_mass()) {
+      cutter.take_quad(q, mass.mass_before[q], quad_mass);
+      sink.count(mass.quads[q].depth);
+    } else if (quad_mass > 0) {
+      walks.walk(q, sink);
+    }
+    ++q;
   }
   cutter.finish();
 }

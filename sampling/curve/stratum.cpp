@@ -34,6 +34,20 @@ SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t 
   return nearest.point;
 }
 
+/// Of a run of base quads, the one whose centre of mass is nearest to `target_O`.
+std::size_t nearest_quad(const CurveMass::Implementation& mass, const StratumPart& part,
+                         const Eigen::Vector3d& target_O) {
+  std::size_t nearest = part.heaviest_quad;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t q = part.first_quad; q < part.last_quad; ++q) {
+    const double quad_mass = mass.mass_of(q);
+    if (!(quad_mass > 0)) continue;
+    const double distance2 = (mass.quads[q].moment_O / quad_mass - target_O).squaredNorm();
+    if (distance2 < least) nearest = q, least = distance2;
+  }
+  return nearest;
+}
+
 SurfacePoint heaviest_point(const CurveMass::Implementation& mass, const StratumPart& part) {
   if (part.heaviest_quad != StratumPart::kNoQuad) return heaviest_point(mass, part.heaviest_quad);
   if (part.polygon_size == 0 || mass.tone.asked(part.heaviest) > 0) return part.heaviest;
@@ -71,8 +85,9 @@ SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, const Stra
     point = surface_point(part.triangle, part.moment_b / part.mass);
   } else {
     const Eigen::Vector3d target = part.moment_O / part.mass;
-    const SurfacePoint start =
-        part.heaviest_quad == StratumPart::kNoQuad ? part.heaviest : nearest_in_quad(mass, part.heaviest_quad, target);
+    const SurfacePoint start = part.heaviest_quad == StratumPart::kNoQuad
+                                   ? part.heaviest
+                                   : nearest_in_quad(mass, nearest_quad(mass, part, target), target);
     point = walk_towards(mass.curve.mesh, mass.curve.neighbours, start, target);
   }
   const double asked = mass.tone.asked(point);

@@ -24,21 +24,33 @@ struct StratumPart {
   SurfacePoint heaviest;
   std::array<Eigen::Vector2d, 12> polygon;
   std::size_t polygon_size = 0;
-  /// ... or, if the heaviest bit is a whole base quad, that.
+  /// ... or, if the heaviest bit is a whole base quad, that; and the run of whole base quads around it.
   static constexpr std::size_t kNoQuad = ~std::size_t{0};
-  std::size_t heaviest_quad = kNoQuad;
+  std::size_t heaviest_quad = kNoQuad, first_quad = 0, last_quad = 0;
+
+  void clear() {
+    mass = heaviest_mass = 0;
+    moment_O.setZero();
+    moment_b.setZero();
+    triangle = kNoTriangle;
+    polygon_size = 0;
+    heaviest_quad = kNoQuad;
+  }
 };
 
 class Stratum {
  public:
-  void clear() { current_ = best_ = StratumPart{}; }
+  void clear() {
+    current_.clear();
+    best_.clear();
+  }
   bool is_empty() const { return !(current_.mass > 0) && !(best_.mass > 0); }
 
   /// The part on `sheet`, to be added to.
   StratumPart& on(std::uint32_t sheet) {
     if (current_.sheet != sheet) {
       if (current_.mass > best_.mass) best_ = current_;
-      current_ = StratumPart{};
+      current_.clear();
       current_.sheet = sheet;
     }
     return current_;

@@ -12,9 +12,16 @@ namespace {
 
 using Index = std::int64_t;
 
+/// std::floor, which without SSE 4.1 is a call.
+Index floor_index(double x) {
+  const auto i = static_cast<Index>(x);
+  return i - (static_cast<double>(i) > x ? 1 : 0);
+}
+
 /// Where the integer grid line `i` of an unbounded picture finds its texel.
 Index texel_index(Index i, int size, bool repeats) {
-  if (!repeats) return std::clamp<Index>(i, 0, size - 1);
+  if (i >= 0 && i < size) return i;
+  if (!repeats) return i < 0 ? 0 : size - 1;
   const Index r = i % size;
   return r < 0 ? r + size : r;
 }
@@ -22,15 +29,36 @@ Index texel_index(Index i, int size, bool repeats) {
 /// The column (or row) that holds `x`, when walking in direction `step`. Without repeats all before texel 0 is column
 /// -1, and all after the last texel is the last column: the tone does not change there.
 Index column_of(double x, double step, int size, bool repeats) {
-  const double column = step < 0 ? std::ceil(x) - 1 : std::floor(x);
-  if (repeats) return static_cast<Index>(column);
-  return static_cast<Index>(std::clamp(column, -1., size - 1.));
+  if (!repeats) x = std::clamp(x, -.5, size - .5);
+  const Index column = floor_index(x);
+  // A walk to the left that begins on a grid line is in the column before it.
+  const Index walked = step < 0 && static_cast<double>(column) == x ? column - 1 : column;
+  return repeats ? walked : std::clamp<Index>(walked, -1, size - 1);
 }
 
+/// Gauss, three places: exact to degree 5.
 constexpr std::array<double, 3> kGaussPlaces{0.1127016653792583, 0.5, 0.8872983346207417};
 constexpr std::array<double, 3> kGaussWeights{5. / 18, 8. / 18, 5. / 18};
 
+/// Dunavant's rule of degree 4 on a triangle: two orbits of three places each, by the barycentric coordinate that
+/// differs, the other one, and the weight.
+struct Orbit {
+  double alone, twice, weight;
+};
+constexpr std::array<Orbit, 2> kTriangleOrbits{{{0.108103018168070, 0.445948490915965, 0.223381589678011},
+                                                {0.816847572980459, 0.091576213509771, 0.109951743655322}}};
+
 }  // namespace
+
+/// The tone at the four texels of one cell of the grid of texel centres; bilinear between them.
+struct ToneLayer::Corners {
+  double a, b;  ///< lower row: left and right
+  double c, d;  ///< upper row
+
+  /// The tone at height t is level(t) + slope(t) s.
+  double level(double t) const { return a + t * (c - a); }
+  double slope(double t) const { return b - a + t * (d - c - b + a); }
+};
 
 /// Walks a polygon's edges through the texels. Between rows j and j + 1 the tone is (1 - t) f(x) + t g(x), t = y - j,
 /// where f and g are piecewise linear; their integrals along x, from a fixed column x0, are kept while the walk crosses
@@ -45,41 +73,40 @@ class ToneLayer::BoundaryWalk {
     const Eigen::Vector2d d = q - p;
     result_.area += .5 * (p.x() + q.x()) * d.y();
     if (d.y() == 0) return;  // the integrals are along dy
+    const double per_column = 1 / d.x(), per_row = 1 / d.y();
     column_ = column_of(p.x() + static_cast<double>(x0_), d.x(), layer_.width_, addressing_.repeat_x);
     enter_row(column_of(p.y() + static_cast<double>(y0_), d.y(), layer_.height_, addressing_.repeat_y));
-    for (double t = 0; t < 1;) {
-      const double t_x = crossing(column_ - x0_, p.x(), d.x(), column_, layer_.width_, addressing_.repeat_x);
-      const double t_y = crossing(row_ - y0_, p.y(), d.y(), row_, layer_.height_, addressing_.repeat_y);
+    const int column_step = d.x() > 0 ? 1 : -1, row_step = d.y() > 0 ? 1 : -1;
+    for (double t = 0;;) {
+      const double t_x =
+          crossing(column_ - x0_, p.x(), d.x(), per_column, column_, layer_.width_, addressing_.repeat_x);
+      const double t_y = crossing(row_ - y0_, p.y(), d.y(), per_row, row_, layer_.height_, addressing_.repeat_y);
       const double end = std::clamp(std::min(t_x, t_y), t, 1.);
       if (end > t) add_piece(p + t * d, p + end * d);
       t = end;
       if (t >= 1) break;
       if (t_x <= t_y)
-        enter_column(column_ + (d.x() > 0 ? 1 : -1));
+        enter_column(column_ + column_step);
       else
-        enter_row(row_ + (d.y() > 0 ? 1 : -1));
+        enter_row(row_ + row_step);
     }
   }
 
   const TexelIntegral& result() const { return result_; }
 
  private:
-  /// Of one column between two rows: the tone at its four texels.
-  struct Corners {
-    double a, b;  ///< row j: at the column's left and right
-    double c, d;  ///< row j + 1
-  };
   /// Integrals along x from x0: of f, g, x f, x g, f^2, f g, g^2.
   struct RowSums {
     double f = 0, g = 0, xf = 0, xg = 0, ff = 0, fg = 0, gg = 0;
   };
 
   /// Where along the edge the walk leaves its column (or row).
-  static double crossing(Index relative, double from, double step, Index index, int size, bool repeats) {
-    const double never = std::numeric_limits<double>::infinity();
-    if (step > 0) return !repeats && index == size - 1 ? never : (static_cast<double>(relative + 1) - from) / step;
-    if (step < 0) return !repeats && index == -1 ? never : (static_cast<double>(relative) - from) / step;
-    return never;
+  static double crossing(Index relative, double from, double step, double per_step, Index index, int size,
+                         bool repeats) {
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    if (step > 0) return !repeats && index == size - 1 ? kNever : (static_cast<double>(relative + 1) - from) * per_step;
+    if (step < 0) return !repeats && index == -1 ? kNever : (static_cast<double>(relative) - from) * per_step;
+    return kNever;
   }
 
   Corners corners(Index column) const {
@@ -90,9 +117,8 @@ class ToneLayer::BoundaryWalk {
 
   void enter_row(Index row) {
     row_ = row;
-    const float* tones = layer_.tones_.data();
-    lower_ = tones + texel_index(row, layer_.height_, addressing_.repeat_y) * layer_.width_;
-    upper_ = tones + texel_index(row + 1, layer_.height_, addressing_.repeat_y) * layer_.width_;
+    lower_ = layer_.row(row, addressing_);
+    upper_ = layer_.row(row + 1, addressing_);
     sums_ = {};
     if (column_ - x0_ > 2 * kBlock)
       sums_ = long_row_sums();
@@ -126,43 +152,42 @@ class ToneLayer::BoundaryWalk {
     column_ = column;
   }
 
-  /// Adds the integrals over the column's first `s` (1: all of it), times `sign`.
-  static RowSums column_sums(const Corners& k, double left, double s) {
-    const double s2 = .5 * s * s, s3 = s * s * s / 3;
-    const double df = k.b - k.a, dg = k.d - k.c;
-    RowSums sums;
-    sums.f = k.a * s + df * s2;
-    sums.g = k.c * s + dg * s2;
-    sums.xf = left * sums.f + k.a * s2 + df * s3;
-    sums.xg = left * sums.g + k.c * s2 + dg * s3;
-    sums.ff = k.a * k.a * s + 2 * k.a * df * s2 + df * df * s3;
-    sums.fg = k.a * k.c * s + (k.a * dg + k.c * df) * s2 + df * dg * s3;
-    sums.gg = k.c * k.c * s + 2 * k.c * dg * s2 + dg * dg * s3;
-    return sums;
+  /// Adds the integrals over a whole column, times `sign`.
+  void add_column(const Corners& k, double left, double sign) {
+    const double f = .5 * (k.a + k.b), g = .5 * (k.c + k.d);
+    sums_.f += sign * f;
+    sums_.g += sign * g;
+    sums_.xf += sign * (left * f + k.a * (1. / 6) + k.b * (1. / 3));
+    sums_.xg += sign * (left * g + k.c * (1. / 6) + k.d * (1. / 3));
+    const double third = sign * (1. / 3);
+    sums_.ff += third * (k.a * k.a + k.a * k.b + k.b * k.b);
+    sums_.fg += third * (k.a * k.c + .5 * (k.a * k.d + k.b * k.c) + k.b * k.d);
+    sums_.gg += third * (k.c * k.c + k.c * k.d + k.d * k.d);
   }
-
-  static RowSums sum_of(const RowSums& p, const RowSums& q, double sign) {
-    return {p.f + sign * q.f,   p.g + sign * q.g,   p.xf + sign * q.xf, p.xg + sign * q.xg,
-            p.ff + sign * q.ff, p.fg + sign * q.fg, p.gg + sign * q.gg};
-  }
-
-  void add_column(const Corners& k, double left, double sign) { sums_ = sum_of(sums_, column_sums(k, left, 1), sign); }
 
   /// A straight piece within one column and row: the integrands are polynomials of degree at most 5 along it.
   void add_piece(const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
     // Left of texel 0 of a picture that does not repeat the column has no left end; the integrals start at x0 = 0.
-    const double left = static_cast<double>(std::max(column_, x0_) - x0_);
+    const double left = static_cast<double>(std::max(column_, x0_) - x0_), low = static_cast<double>(row_ - y0_);
+    const double dx = q.x() - p.x(), dy = q.y() - p.y();
+    double mass = 0, x_mass = 0, y_mass = 0, square = 0;
     for (std::size_t k = 0; k < kGaussPlaces.size(); ++k) {
-      const Eigen::Vector2d m = p + kGaussPlaces[k] * (q - p);
-      const double weight = kGaussWeights[k] * (q.y() - p.y());
-      const double t = m.y() - static_cast<double>(row_ - y0_);
-      const RowSums s = sum_of(sums_, column_sums(here_, left, m.x() - left), 1);
-      const double mass = (1 - t) * s.f + t * s.g;
-      result_.mass += weight * mass;
-      result_.first.x() += weight * ((1 - t) * s.xf + t * s.xg);
-      result_.first.y() += weight * m.y() * mass;
-      result_.square += weight * ((1 - t) * (1 - t) * s.ff + 2 * t * (1 - t) * s.fg + t * t * s.gg);
+      const double y = p.y() + kGaussPlaces[k] * dy, t = y - low, s = p.x() + kGaussPlaces[k] * dx - left;
+      const double level = here_.level(t), slope = here_.slope(t), u = 1 - t;
+      const double here = s * (level + s * (.5 * slope));
+      const double all = sums_.f + t * (sums_.g - sums_.f) + here;
+      const double weighted = kGaussWeights[k] * all;
+      mass += weighted;
+      y_mass += weighted * y;
+      x_mass += kGaussWeights[k] *
+                (sums_.xf + t * (sums_.xg - sums_.xf) + left * here + s * s * (.5 * level + s * slope * (1. / 3)));
+      square += kGaussWeights[k] * (u * (u * sums_.ff + 2 * t * sums_.fg) + t * t * sums_.gg +
+                                    s * (level * level + s * slope * (level + s * slope * (1. / 3))));
     }
+    result_.mass += dy * mass;
+    result_.first.x() += dy * x_mass;
+    result_.first.y() += dy * y_mass;
+    result_.square += dy * square;
   }
 
   const ToneLayer& layer_;
@@ -175,6 +200,36 @@ class ToneLayer::BoundaryWalk {
   RowSums sums_;
   TexelIntegral result_;
 };
+
+/// Within one cell the tone is bilinear: its square has degree 4 at most.
+TexelIntegral ToneLayer::integrate_in_cell(std::span<const Eigen::Vector2d> polygon, const Corners& k,
+                                           const Eigen::Vector2d& origin) {
+  TexelIntegral sum;
+  const double x0 = polygon[0].x() - origin.x(), y0 = polygon[0].y() - origin.y();
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    const std::array<double, 3> x{x0, polygon[i - 1].x() - origin.x(), polygon[i].x() - origin.x()};
+    const std::array<double, 3> y{y0, polygon[i - 1].y() - origin.y(), polygon[i].y() - origin.y()};
+    const double area = .5 * ((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]));
+    const double x_sum = x[0] + x[1] + x[2], y_sum = y[0] + y[1] + y[2];
+    double mass = 0, x_mass = 0, y_mass = 0, square = 0;
+    for (const Orbit& orbit : kTriangleOrbits)
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double s = orbit.twice * x_sum + (orbit.alone - orbit.twice) * x[c];
+        const double t = orbit.twice * y_sum + (orbit.alone - orbit.twice) * y[c];
+        const double tone = k.level(t) + s * k.slope(t), weighted = orbit.weight * tone;
+        mass += weighted;
+        x_mass += weighted * s;
+        y_mass += weighted * t;
+        square += weighted * tone;
+      }
+    sum.area += area;
+    sum.mass += area * mass;
+    sum.first += area * Eigen::Vector2d(x_mass, y_mass);
+    sum.square += area * square;
+  }
+  sum.first += sum.mass * origin;
+  return sum;
+}
 
 ToneLayer::ToneLayer(int width, int height, std::vector<float> tones)
     : width_(width), height_(height), tones_(std::move(tones)) {
@@ -241,19 +296,33 @@ double ToneLayer::at(const Eigen::Vector2d& point, TexelAddressing addressing) c
 
 TexelIntegral ToneLayer::integrate(std::span<const Eigen::Vector2d> polygon, TexelAddressing addressing) const {
   if (polygon.size() < 3) return {};
-  Eigen::Vector2d low = polygon[0];
-  for (const Eigen::Vector2d& p : polygon) low = low.cwiseMin(p);
-  // Sums start at the polygon, so that tiny polygons lose no digits.
-  const Index x0 = std::max<Index>(column_of(low.x(), 0, width_, addressing.repeat_x),
-                                   addressing.repeat_x ? std::numeric_limits<Index>::min() : 0);
+  Eigen::Vector2d low = polygon[0], high = low;
+  for (const Eigen::Vector2d& p : polygon.subspan(1)) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  const Index column = column_of(low.x(), 0, width_, addressing.repeat_x);
   const Index y0 = column_of(low.y(), 0, height_, addressing.repeat_y);
+  const bool is_inside = column >= 0 && y0 >= 0 && column + 1 < width_ && y0 + 1 < height_;
+  if (is_inside && high.x() <= static_cast<double>(column + 1) && high.y() <= static_cast<double>(y0 + 1)) {
+    const float* lower = tones_.data() + y0 * width_ + column;
+    const float* upper = lower + width_;
+    return integrate_in_cell(polygon, {lower[0], lower[1], upper[0], upper[1]},
+                             {static_cast<double>(column), static_cast<double>(y0)});
+  }
+  // Sums start at the polygon, so that tiny polygons lose no digits.
+  const Index x0 = addressing.repeat_x ? column : std::max<Index>(column, 0);
   const Eigen::Vector2d origin(static_cast<double>(x0), static_cast<double>(y0));
   BoundaryWalk walk(*this, addressing, x0, y0);
   for (std::size_t i = 0; i < polygon.size(); ++i)
-    walk.add_edge(polygon[i] - origin, polygon[(i + 1) % polygon.size()] - origin);
+    walk.add_edge(polygon[i] - origin, polygon[i + 1 == polygon.size() ? 0 : i + 1] - origin);
   TexelIntegral result = walk.result();
   result.first += result.mass * origin;
   return result;
+}
+
+const float* ToneLayer::row(std::int64_t row, TexelAddressing addressing) const {
+  return tones_.data() + texel_index(row, height_, addressing.repeat_y) * width_;
 }
 
 }  // namespace hilbrush

@@ -39,6 +39,11 @@ class ToneLayer {
 
  private:
   class BoundaryWalk;
+  struct Corners;
+
+  static TexelIntegral integrate_in_cell(std::span<const Eigen::Vector2d> polygon, const Corners& corners,
+                                         const Eigen::Vector2d& origin);
+  const float* row(std::int64_t row, TexelAddressing addressing) const;
 
   /// Integrals along a row from texel 0, of the tone, of x times it, of its square, and of its product with the row
   /// above.

@@ -19,6 +19,7 @@ template <class TexelValue>
 double look_up(int width, int height, const Eigen::Vector2d& point, TexelAddressing addressing,
                TexelValue texel_value) {
   const auto index = [](double i, int size, bool repeats) {
+    if (i >= 0 && i < size) return static_cast<std::size_t>(i);
     const double wrapped = repeats ? i - std::floor(i / size) * size : i;
     return static_cast<std::size_t>(std::clamp(wrapped, 0., size - 1.));
   };

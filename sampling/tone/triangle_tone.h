@@ -31,6 +31,9 @@ class TriangleTone {
   /// sense of rotation. Thread-safe.
   ToneIntegral integrate(std::span<const Eigen::Vector2d> polygon) const;
 
+  /// m^2 for a unit of barycentric area: twice the triangle's area.
+  double space() const { return space_; }
+
   /// Zero everywhere.
   bool is_blank() const { return kind_ == kConstant && tone_ == 0; }
 
@@ -43,8 +46,8 @@ class TriangleTone {
   Kind kind_ = kConstant;
   std::uint32_t triangle_ = 0;
   const ToneField* field_ = nullptr;
-  double space_ = 0;  ///< m^2 for a unit of barycentric area: twice the triangle's area
-  double tone_ = 0;   ///< of kConstant
+  double space_ = 0;
+  double tone_ = 0;  ///< of kConstant
   // Of kTexels:
   const ToneLayer* layer_ = nullptr;
   TexelAddressing addressing_;

@@ -163,6 +163,56 @@ TEST(Sample, EveryStratumHasItsMassWhateverTheMesh) {
       }
 }
 
+/// Large flat areas and fine lines.
+TexturedMesh line_drawing() {
+  const auto is_line = [](int i, int j) { return (i > 170 && i < 174) || j == 512 || j == 513 || std::abs(i - j) < 2; };
+  return test::with_texture(
+      test::rectangle(.05, .05, 4, 4), 1024, 1024, [&](int i, int j) { return is_line(i, j) ? .05 : .6; }, false,
+      false);
+}
+
+TEST(Sample, AdaptivePatchesAreFewAndPlaceTheSameDots) {
+  const TexturedMesh mesh = line_drawing();
+  const SurfaceCurve curve(mesh);
+  const ToneField tone(mesh, {});
+  const CurveMass mass(curve, tone);
+  SampleOptions options = options_for(200'000);
+  SampleReport adaptive_report, uniform_report;
+  const DotSequence adaptive = place_dots(mass, options, &adaptive_report);
+  options.uniform_depth = static_cast<int>(adaptive_report.patches_at_depth.size()) - 1;
+  const DotSequence uniform = place_dots(mass, options, &uniform_report);
+  EXPECT_GE(uniform_report.patch_count, 20 * adaptive_report.patch_count)
+      << adaptive_report.patch_count << " adaptive, finest depth " << *options.uniform_depth;
+  std::vector<double> apart;
+  for (std::size_t i = 0; i < adaptive.dots.size(); ++i)
+    apart.push_back((adaptive.dots[i].position_O - uniform.dots[i].position_O).norm() / adaptive.pitch_m);
+  EXPECT_LT(mean(apart), .05) << "pitches between a dot and the same dot";
+}
+
+TEST(Sample, StreamedDotsArePlacedDots) {
+  const TexturedMesh mesh = test::with_texture(
+      test::torus(), 64, 64, [](int i, int j) { return .5 + .5 * std::sin(.3 * i) * std::cos(.2 * j); });
+  const SurfaceCurve curve(mesh, CurveKind::kPeano2);
+  const ToneField tone(mesh, {});
+  const CurveMass mass(curve, tone);
+  for (const std::uint64_t count : {1, 300, 30000}) {
+    const DotSequence all = place_dots(mass, options_for(count));
+    SampleReport report;
+    std::size_t i = 0;
+    stream_dots(
+        mass, options_for(count),
+        [&](std::span<const Dot> dots) {
+          for (const Dot& dot : dots) ASSERT_EQ(dot.position_O, all.dots.at(i++).position_O);
+        },
+        &report);
+    EXPECT_EQ(i, count);
+    EXPECT_EQ(report.components.at(0).dot_count, count);
+    EXPECT_NEAR(report.components.at(0).path_length_m, report.path_length_m, 1e-12);
+  }
+  const auto stops = [](std::span<const Dot>) { throw InputError("", "enough"); };
+  EXPECT_THROW(stream_dots(mass, options_for(300000), stops), InputError);
+}
+
 TEST(Sample, DotsFollowTheTone) {
   const TexturedMesh mesh = ramp();
   const DotSequence sequence = sample(mesh, options_for(20000));
