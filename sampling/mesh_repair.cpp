@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "sampling/disk/edges.h"
@@ -43,6 +44,39 @@ void turn_over(TexturedMesh& mesh, std::size_t t) {
 bool has_usable_corners(const TexturedMesh& mesh, std::size_t t) {
   return std::ranges::all_of(mesh.triangles[t],
                              [&](std::uint32_t v) { return v < mesh.vertices.size() && mesh.vertices[v].allFinite(); });
+}
+
+/// The corner where the shortest side of a triangle begins, if that side is a point next to the longest one.
+std::optional<int> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
+  std::array<double, 3> length2{};
+  for (int k = 0; k < 3; ++k)
+    length2[static_cast<std::size_t>(k)] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
+  const auto shortest = std::min_element(length2.begin(), length2.end());
+  const double longest2 = *std::max_element(length2.begin(), length2.end());
+  if (!(*shortest > 0) || *shortest > kFlattest * kFlattest * longest2) return std::nullopt;
+  return static_cast<int>(shortest - length2.begin());
+}
+
+/// Gives the ends of collapsed sides one position, so that what hung together over such a triangle still does: poles
+/// whose vertices differ by rounding. Returns whether there were any.
+bool close_collapsed_sides(TexturedMesh& mesh) {
+  std::vector<std::uint32_t> parent(mesh.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto find = [&](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  bool is_any = false;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (const auto k = collapsed_side(mesh, t)) {
+      const auto i = static_cast<std::size_t>(*k);
+      const std::uint32_t a = find(mesh.triangles[t][i]), b = find(mesh.triangles[t][(i + 1) % 3]);
+      parent[std::max(a, b)] = std::min(a, b);
+      is_any = true;
+    }
+  if (is_any)
+    for (std::uint32_t v = 0; v < parent.size(); ++v) mesh.vertices[v] = Eigen::Vector3d(mesh.vertices[find(v)]);
+  return is_any;
 }
 
 bool has_area(const TexturedMesh& mesh, std::size_t t) {
@@ -325,7 +359,9 @@ RepairedMesh repair_mesh(TexturedMesh mesh) {
   };
   count("triangles without usable corners dropped",
         keep_triangles(mesh, [&](std::size_t t) { return has_usable_corners(mesh, t); }));
-  count("vertices welded", weld_vertices(mesh));
+  std::size_t welded = weld_vertices(mesh);
+  if (close_collapsed_sides(mesh)) welded += weld_vertices(mesh);
+  count("vertices welded", welded);
   count("degenerate triangles dropped", keep_triangles(mesh, [&](std::size_t t) { return has_area(mesh, t); }));
   count("duplicate triangles dropped", drop_duplicates(mesh));
   if (mesh.triangles.empty()) throw InputError("", "the model has no triangle with an area");

@@ -12,9 +12,11 @@
 #include "sampling/tone_field.h"
 
 /// Mesh to dots, the entry of sampling/:
-///   repair_mesh -> components -> cut_to_disk -> square_map -> SurfaceCurve (base tree of the adaptive curve)
+///   repair_mesh -> components -> flatten (cut_to_disk, map_to_square) -> SurfaceCurve (base tree of the adaptive
+///   curve)
 ///   -> CurveMass (its exact masses under a tone) -> strata -> dots, one after another along the curve.
-/// A component that can't be mapped validly is ordered along a 3D Hilbert curve, and the report says why.
+/// A component that can't be mapped validly is divided; what still can't is ordered along a 3D Hilbert curve, and the
+/// report says why.
 namespace hilbrush {
 
 struct ComponentReport {
@@ -22,8 +24,11 @@ struct ComponentReport {
   int genus = -1;  ///< -1: not a manifold of known genus
   int boundary_loops = 0;
   double area_m2 = 0;
-  bool is_mapped = false;    ///< on the square; else in 3D Hilbert order
-  std::string order_reason;  ///< why not mapped
+  bool is_mapped = false;       ///< on the square; else in 3D Hilbert order
+  std::string order_reason;     ///< why not mapped, or not in one piece
+  std::size_t piece_count = 1;  ///< more where no map of the whole is valid: each has a curve of its own
+  double cut_length_m = 0;      ///< of the cuts that open it
+  double map_shear = 1;         ///< mean over the surface of the map's larger stretch over the smaller one
 };
 
 /// The dots of one component, within it.

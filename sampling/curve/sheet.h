@@ -54,8 +54,6 @@ struct Sheet {
   std::vector<std::array<Eigen::Vector2d, 3>> parts;  ///< corners by second and third barycentric coordinate
   std::vector<std::uint32_t> face_lists;
   std::vector<BaseQuad> base_quads;  ///< in order of the curve; empty ones are left out
-  Eigen::Vector3d begin_O = Eigen::Vector3d::Zero(),
-                  end_O = Eigen::Vector3d::Zero();  ///< where the curve starts and ends
 
   const SheetFace& face_of(const BaseQuad& quad, std::uint32_t i) const {
     return faces[face_lists[quad.first_face + i]];
@@ -92,8 +90,5 @@ void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensi
 /// Fills in the base tree of a sheet whose faces are there. Cost O(faces log faces). On the square it gives up and
 /// returns false if the map is so sheared that the quads would hold each triangle many times.
 bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh);
-
-/// Orders sheets so that the jump from the end of one to the beginning of the next is short; the first stays first.
-std::vector<std::uint32_t> chain_sheets(const std::vector<Sheet>& sheets);
 
 }  // namespace hilbrush

@@ -1,6 +1,7 @@
 #include "sampling/disk/components.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace hilbrush {
 namespace {
@@ -75,6 +76,29 @@ std::vector<BoundaryLoop> boundary_loops(const Neighbours& neighbours) {
       loops.push_back(std::move(loop));
     }
   return loops;
+}
+
+Component describe_component(const TexturedMesh& mesh, const Neighbours& neighbours,
+                             std::vector<std::uint32_t> triangles) {
+  Neighbours inside(triangles.size(), {kNoSide, kNoSide, kNoSide});
+  Component component;
+  std::int64_t open_sides = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    component.area_m2 += mesh.area_vector(triangles[i]).norm();
+    for (std::size_t s = 0; s < 3; ++s) {
+      const TriangleSide other = neighbours[triangles[i]][s];
+      const auto at = std::lower_bound(triangles.begin(), triangles.end(), other.triangle);
+      if (other != kNoSide && at != triangles.end() && *at == other.triangle)
+        inside[i][s] = {static_cast<std::uint32_t>(at - triangles.begin()), other.side};
+      else
+        ++open_sides;
+    }
+  }
+  const auto count = static_cast<std::int64_t>(triangles.size());
+  component.boundary_loops = static_cast<int>(boundary_loops(inside).size());
+  component.genus = genus_of(find_fans(inside).count, (3 * count + open_sides) / 2, count, component.boundary_loops);
+  component.triangles = std::move(triangles);
+  return component;
 }
 
 std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbours& neighbours) {

@@ -21,6 +21,10 @@ struct Component {
 /// Triangles hang together over shared edges; the components are in order of their first triangles. Cost O(n).
 std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbours& neighbours);
 
+/// The shape of some triangles, rising, that hang together by themselves: sides to other triangles are boundary.
+Component describe_component(const TexturedMesh& mesh, const Neighbours& neighbours,
+                             std::vector<std::uint32_t> triangles);
+
 /// All loops of sides without a neighbour, in order of their first sides.
 std::vector<BoundaryLoop> boundary_loops(const Neighbours& neighbours);
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 #include <numeric>
 
 #include "sampling/check.h"
@@ -17,7 +18,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double kLeastWeight = 1e-2, kMostWeight = 1e3;
+constexpr double kLeastWeight = 1e-4, kMostWeight = 1e3;
 /// Below this METIS has nothing to gain.
 constexpr std::size_t kSmallGraph = 2000;
 
@@ -148,6 +149,9 @@ std::vector<std::uint32_t> dissected(const WeightedGraph& graph) {
   auto vertex_count = static_cast<idx_t>(graph.vertex_count());
   std::vector<idx_t> begin(graph.begin.begin(), graph.begin.end()), to(graph.to.begin(), graph.to.end());
   std::vector<idx_t> order(graph.vertex_count()), place(graph.vertex_count());
+  // METIS draws from the library's one rand(), seeded anew by each call.
+  static std::mutex metis;
+  const std::lock_guard lock(metis);
   std::array<idx_t, METIS_NOPTIONS> options{};
   METIS_SetDefaultOptions(options.data());
   options[METIS_OPTION_COMPRESS] = 0;  // no two vertices of a mesh have the same neighbours

@@ -1,6 +1,7 @@
 #include "sampling/disk/cut_to_disk.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -14,11 +15,13 @@ namespace {
 
 /// Sides of an outer boundary are split until none is longer than this share of all of it.
 constexpr double kLongestBoundarySide = 1. / 16;
-/// A mesh is refined to so many faces, shared out by area, and no component to more than kFewestFaces.
-constexpr double kFewestFacesOfMesh = 20'000, kFewestFaces = 5000;
-/// Towards Delaunay a mesh is refined to so many, but no component to more than kMostGrowth times its own; all to
-/// kLeastGrowth times their own if they need it.
-constexpr double kDelaunayFacesOfMesh = 80'000, kMostGrowth = 16, kLeastGrowth = 1.1;
+/// Faces that a whole mesh may get, shared out by area, and a component at most, before needles are looked at ...
+constexpr double kRefinedMesh = 40'000, kRefinedComponent = 5000;
+/// ... and towards Delaunay; then no component grows beyond kMostGrowth times its own, but all may to kLeastGrowth
+/// times.
+constexpr double kDelaunayMesh = 200'000, kDelaunayComponent = 80'000, kMostGrowth = 16, kLeastGrowth = 1.1;
+/// A disk with a shorter boundary, over the root of its area, is a bag: it is slit from its mouth to the far end.
+constexpr double kShortestBoundary = 1.2;
 /// So many roots are tried for the loops that open handles.
 constexpr int kRootCount = 4;
 
@@ -251,9 +254,10 @@ std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loo
 }
 
 void refine_for_map(Disk& disk, double area_share) {
-  refine(disk, static_cast<std::size_t>(std::min(kFewestFacesOfMesh * area_share, kFewestFaces)));
+  refine(disk, static_cast<std::size_t>(std::min(kRefinedMesh * area_share, kRefinedComponent)));
   const auto n = static_cast<double>(disk.faces().size());
-  const double most = std::max(kLeastGrowth * n, std::min(kMostGrowth * n, kDelaunayFacesOfMesh * area_share));
+  const double budget = std::min({kDelaunayMesh * area_share, kDelaunayComponent, kMostGrowth * n});
+  const double most = std::max(kLeastGrowth * n, budget);
   split_towards_delaunay(disk, static_cast<std::size_t>(most));
 }
 
@@ -306,13 +310,19 @@ std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& n
     marks.start = edges.back();
   }
   if (!marks.start) marks.forks = forks_of(disk, edges, is_boundary);
-  if (open_cuts(cut, edges, marks)) return cut;
-  reason = "no cut was found that makes it a disk";
-  return std::nullopt;
+  if (!open_cuts(cut, edges, marks)) {
+    reason = "no cut was found that makes it a disk";
+    return std::nullopt;
+  }
+  if (length_of(disk, cut.outer) < kShortestBoundary * std::sqrt(component.area_m2)) {
+    std::vector<std::uint32_t> all(disk.positions().size());
+    std::iota(all.begin(), all.end(), 0u);
+    extend_cut(cut, all);
+  }
+  return cut;
 }
 
 bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {
-  const std::vector<char> is_boundary = boundary_vertices(cut.disk);
   std::vector<std::uint32_t> sources;
   for (const TriangleSide s : cut.outer) sources.push_back(cut.disk.from(s));
   const Distances distances = distances_from(sources, cut.disk, Arcs(cut.disk));
@@ -321,7 +331,10 @@ bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {
   const std::vector<TriangleSide> path = path_to_source(cut.disk, distances, *deepest);
   Marks marks;
   for (const auto v : cut.forks) marks.forks.push_back(cut.disk.positions()[v]);
-  if (!cut.forks.empty()) marks.forks.push_back(cut.disk.positions()[cut.disk.from(path.back())]);
+  if (cut.forks.empty())
+    marks.start = path.back();
+  else
+    marks.forks.push_back(cut.disk.positions()[cut.disk.from(path.back())]);
   return open_cuts(cut, path, marks);
 }
 

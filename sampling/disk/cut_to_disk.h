@@ -25,8 +25,8 @@ struct CutOptions {
 /// Coarse and blunt-angled triangulations are refined first, within bounds.
 /// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter). Handles and
 /// several boundaries: along the shortest arcs from boundary to boundary (or from one vertex back to it) that leave a
-/// disk. A hole that is filled instead makes the curve jump across it. Returns nothing, and a reason, for what is not a
-/// manifold. Cost O(n log n).
+/// disk; a bag with a small mouth is slit. A hole that is filled instead makes the curve jump across it. Returns
+/// nothing, and a reason, for what is not a manifold. Cost O(n log n).
 std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
                                    std::string& reason, const CutOptions& options = {});
 

@@ -8,15 +8,17 @@
 namespace hilbrush {
 
 Disk::Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<std::uint32_t>& triangles) {
-  const auto face_of = [&](std::uint32_t t) {
-    return static_cast<std::uint32_t>(std::lower_bound(triangles.begin(), triangles.end(), t) - triangles.begin());
+  const auto side_of = [&](TriangleSide other) {
+    const auto at = std::lower_bound(triangles.begin(), triangles.end(), other.triangle);
+    if (at == triangles.end() || *at != other.triangle) return kNoSide;
+    return TriangleSide{static_cast<std::uint32_t>(at - triangles.begin()), other.side};
   };
   for (const auto t : triangles) {
     faces_.push_back(mesh.triangles[t]);
     sources_.push_back({t, {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}});
     neighbours_.push_back(neighbours[t]);
     for (TriangleSide& other : neighbours_.back())
-      if (other != kNoSide) other.triangle = face_of(other.triangle);
+      if (other != kNoSide) other = side_of(other);
   }
   const Fans fans = find_fans(neighbours_);
   positions_.resize(fans.count);

@@ -19,7 +19,7 @@ struct FaceSource {
 
 class Disk {
  public:
-  /// `triangles` rising, as in Component.
+  /// `triangles` rising, as in Component; sides to other triangles are boundary.
   Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<std::uint32_t>& triangles);
 
   const std::vector<Triangle>& faces() const { return faces_; }

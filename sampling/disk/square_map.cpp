@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sampling/disk/convex_combination.h"
 #include "sampling/disk/corners.h"
@@ -20,6 +21,10 @@ constexpr double kMostSquares = 64;
 constexpr double kGoodLengthening = 1.03;
 /// So many parts that the map shrinks to nothing are slit open, one after the other.
 constexpr int kMostExtensions = 6;
+/// Each of them must leave at most this share of the flipped faces.
+constexpr double kGoodProgress = .8;
+/// The general solver that mean values need is slow.
+constexpr std::size_t kMostFacesForMeanValues = 20'000;
 
 bool is_flipped(const Triangle& f, const std::vector<Vector2d>& places) {
   return orientation(places[f[0]], places[f[1]], places[f[2]]) <= 0;
@@ -159,6 +164,7 @@ struct MapTrial {
         corners(choose_corners(cut, along)),
         boundary(place_boundary(cut, corners, along)) {
     split_chords(cut.disk, boundary);
+    cut.outer = boundary_loops(cut.disk.neighbours()).front();  // splitting has moved sides about
     graph = cotan_graph(cut.disk);
     order = elimination_order(graph);
     boundary_places.resize(static_cast<Eigen::Index>(boundary.places.size()), 2);
@@ -221,6 +227,7 @@ std::size_t count_flipped(const Disk& disk, const std::vector<Vector2d>& places)
 }
 
 std::optional<SquareMap> map_to_square(CutDisk& cut) {
+  std::size_t most_flipped = std::numeric_limits<std::size_t>::max();
   for (int extensions = 0;; ++extensions) {
     if (cut.outer.size() < 4) return std::nullopt;
     MapTrial trial(cut);
@@ -229,10 +236,11 @@ std::optional<SquareMap> map_to_square(CutDisk& cut) {
     trial.slide_boundary();
     if (trial.best) return trial.best;
     // Where places differ in their last digits only, the map has shrunk a part to nothing.
-    if (extensions == kMostExtensions || !extend_cut(cut, trial.flipped)) {
-      trial.use_mean_values();
-      return trial.best;
-    }
+    const bool is_better = trial.flipped.size() < most_flipped;
+    most_flipped = static_cast<std::size_t>(kGoodProgress * static_cast<double>(trial.flipped.size()));
+    if (is_better && extensions < kMostExtensions && extend_cut(cut, trial.flipped)) continue;
+    if (cut.disk.faces().size() <= kMostFacesForMeanValues) trial.use_mean_values();
+    return trial.best;
   }
 }
 

@@ -287,7 +287,8 @@ TEST(Sample, NeedlesPaintAsWellAsEvenTriangles) {
   const auto needles = nearest_distances(sample(test::needle_cylinder(), options_for(10000)));
   const auto even = nearest_distances(sample(test::even_cylinder(), options_for(10000)));
   EXPECT_NEAR(mean(needles), mean(even), .02);
-  EXPECT_NEAR(needles[100], even[100], .08) << "the nearest percent";
+  // The even one happens to lie on a grid.
+  EXPECT_NEAR(needles[100], even[100], .16) << "the nearest percent";
   EXPECT_GT(needles[100], .45);
 }
 

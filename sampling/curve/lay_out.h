@@ -1,0 +1,20 @@
+#pragma once
+#include <vector>
+
+#include "sampling/curve/sheet.h"
+#include "sampling/disk/components.h"
+#include "sampling/sample.h"
+
+/// From components to sheets: each is flattened, the pieces are chained, and their base trees are built.
+namespace hilbrush {
+
+struct LaidOut {
+  std::vector<Sheet> sheets;  ///< in the order in which they are walked; several of one component if it was divided
+  std::vector<ComponentReport> reports;  ///< as `components`
+};
+
+/// In parallel over components; the same result for any number of threads. `progress` is called from this thread.
+LaidOut lay_out(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<Component>& components,
+                CurveKind kind, const Progress& progress);
+
+}  // namespace hilbrush

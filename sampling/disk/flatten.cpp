@@ -1,0 +1,185 @@
+#include "sampling/disk/flatten.h"
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <queue>
+#include <utility>
+
+#include "sampling/disk/cut_to_disk.h"
+#include "sampling/disk/square_map.h"
+
+namespace hilbrush {
+namespace {
+
+/// A component is divided so many times, and no piece with fewer triangles is.
+constexpr int kMostDivisions = 8;
+constexpr std::size_t kFewestToDivide = 40;
+
+std::array<Eigen::Vector3d, 4> corner_positions(const CutDisk& cut, const SquareMap& map) {
+  const double width = map.square_count;
+  const std::array<Eigen::Vector2d, 4> corners{Eigen::Vector2d(0, 0), Eigen::Vector2d(width, 0),
+                                               Eigen::Vector2d(width, 1), Eigen::Vector2d(0, 1)};
+  std::array<Eigen::Vector3d, 4> positions;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto distance2 = [&](TriangleSide s) { return (map.places[cut.disk.from(s)] - corners[k]).squaredNorm(); };
+    positions[k] = cut.disk.positions()[cut.disk.from(*std::ranges::min_element(cut.outer, {}, distance2))];
+  }
+  return positions;
+}
+
+FlatPiece make_piece(const CutDisk& cut, const SquareMap& map) {
+  FlatPiece piece;
+  piece.square_count = map.square_count;
+  piece.corners_O = corner_positions(cut, map);
+  piece.faces.reserve(cut.disk.faces().size());
+  for (std::size_t f = 0; f < cut.disk.faces().size(); ++f) {
+    const FaceSource& source = cut.disk.sources()[f];
+    if (source.triangle == kNoTriangle) continue;
+    const Triangle& face = cut.disk.faces()[f];
+    piece.faces.push_back(
+        {source.triangle, {map.places[face[0]], map.places[face[1]], map.places[face[2]]}, source.corners});
+  }
+  return piece;
+}
+
+/// The two halves of a component: what is nearer to one of two far ends, by way of the triangles' centres.
+std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const Neighbours& neighbours,
+                                                 const std::vector<std::uint32_t>& triangles) {
+  const std::size_t n = triangles.size();
+  const auto local = [&](std::uint32_t t) {
+    const auto at = std::lower_bound(triangles.begin(), triangles.end(), t);
+    return at != triangles.end() && *at == t ? static_cast<std::size_t>(at - triangles.begin()) : n;
+  };
+  const auto centre = [&](std::size_t i) {
+    return Eigen::Vector3d(
+        (mesh.corner(triangles[i], 0) + mesh.corner(triangles[i], 1) + mesh.corner(triangles[i], 2)) / 3);
+  };
+  struct Ways {
+    std::vector<double> distance;
+    std::vector<std::size_t> source;
+  };
+  const auto ways_from = [&](const std::vector<std::size_t>& sources) {
+    Ways ways{std::vector<double>(n, std::numeric_limits<double>::infinity()), std::vector<std::size_t>(n, n)};
+    using Entry = std::pair<double, std::size_t>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+    for (const auto s : sources) {
+      ways.distance[s] = 0;
+      ways.source[s] = s;
+      queue.push({0, s});
+    }
+    while (!queue.empty()) {
+      const auto [distance, i] = queue.top();
+      queue.pop();
+      if (distance > ways.distance[i]) continue;
+      for (const TriangleSide other : neighbours[triangles[i]]) {
+        const std::size_t j = other == kNoSide ? n : local(other.triangle);
+        if (j == n) continue;
+        const double longer = distance + (centre(j) - centre(i)).norm();
+        if (longer >= ways.distance[j]) continue;
+        ways.distance[j] = longer;
+        ways.source[j] = ways.source[i];
+        queue.push({longer, j});
+      }
+    }
+    return ways;
+  };
+  const auto farthest = [&](std::size_t from) {
+    const Ways ways = ways_from({from});
+    return static_cast<std::size_t>(std::ranges::max_element(ways.distance) - ways.distance.begin());
+  };
+  const std::size_t one_end = farthest(0), other_end = farthest(one_end);
+  const Ways ways = ways_from({one_end, other_end});
+  std::array<std::vector<std::uint32_t>, 2> result;
+  for (std::size_t i = 0; i < n; ++i) result[ways.source[i] == one_end ? 0 : 1].push_back(triangles[i]);
+  return result;
+}
+
+class Flattening {
+ public:
+  Flattening(const TexturedMesh& mesh, const Neighbours& neighbours, double area_share, double area_m2)
+      : mesh_(mesh), neighbours_(neighbours), share_per_m2_(area_m2 > 0 ? area_share / area_m2 : 0) {}
+
+  FlatComponent run(const Component& component) {
+    add(component, kMostDivisions);
+    if (area_ > 0) result_.shear = sheared_ / area_;
+    if (result_.pieces.size() > 1)
+      result_.reason = "divided into " + std::to_string(result_.pieces.size()) + " pieces: " + result_.reason;
+    return std::move(result_);
+  }
+
+ private:
+  void add(const Component& component, int divisions) {
+    if (add_whole(component)) return;
+    if (component.genus < 0 || divisions == 0 || component.triangles.size() < kFewestToDivide) {
+      FlatPiece piece;
+      piece.triangles_in_space = component.triangles;
+      piece.corners_O = box_corners(mesh_, component.triangles);
+      result_.pieces.push_back(std::move(piece));
+      return;
+    }
+    is_divided_ = true;
+    for (const auto& triangles : halves(mesh_, neighbours_, component.triangles))
+      add(describe_component(mesh_, neighbours_, triangles), divisions - 1);
+  }
+
+  bool add_whole(const Component& component) {
+    CutOptions options;
+    options.area_share = share_per_m2_ * component.area_m2;
+    const bool has_holes = component.boundary_loops > 1;
+    for (int attempt = 0; attempt < (has_holes ? 2 : 1); ++attempt) {
+      if (attempt == 1) options.most_holes = 0;
+      auto cut = cut_to_disk(mesh_, neighbours_, component, result_.reason, options);
+      if (!cut) return false;
+      const auto map = map_to_square(*cut);
+      if (map) {
+        result_.pieces.push_back(make_piece(*cut, *map));
+        if (!is_divided_) result_.reason.clear();
+        result_.cut_length_m += cut->cut_length_m;
+        sheared_ += map->shear * component.area_m2;
+        area_ += component.area_m2;
+        return true;
+      }
+      result_.reason = "no map of it onto the square without a flipped triangle was found";
+    }
+    return false;
+  }
+
+  const TexturedMesh& mesh_;
+  const Neighbours& neighbours_;
+  double share_per_m2_;
+  double sheared_ = 0, area_ = 0;
+  bool is_divided_ = false;
+  FlatComponent result_;
+};
+
+}  // namespace
+
+std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh, const std::vector<std::uint32_t>& triangles) {
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  const auto for_each_vertex = [&](auto visit) {
+    for (const auto t : triangles)
+      for (int c = 0; c < 3; ++c) visit(mesh.corner(t, c));
+  };
+  for_each_vertex([&](const Eigen::Vector3d& p) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  });
+  const std::array<Eigen::Vector3d, 4> box{low, Eigen::Vector3d(high.x(), low.y(), low.z()),
+                                           Eigen::Vector3d(high.x(), high.y(), low.z()),
+                                           Eigen::Vector3d(low.x(), high.y(), low.z())};
+  std::array<Eigen::Vector3d, 4> nearest;
+  nearest.fill(mesh.corner(triangles.front(), 0));
+  for_each_vertex([&](const Eigen::Vector3d& p) {
+    for (std::size_t k = 0; k < 4; ++k)
+      if ((p - box[k]).squaredNorm() < (nearest[k] - box[k]).squaredNorm()) nearest[k] = p;
+  });
+  return nearest;
+}
+
+FlatComponent flatten(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
+                      double area_share) {
+  return Flattening(mesh, neighbours, area_share, component.area_m2).run(component);
+}
+
+}  // namespace hilbrush
