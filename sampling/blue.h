@@ -11,7 +11,7 @@ namespace hilbrush {
 /// After Fattal, "Blue-Noise Point Sampling using Kernel Density Model", 2011; differs: dots stay in their strata, so
 /// that the low discrepancy and the short path of the curve stay, and no temperature is needed.
 /// Options, report and errors as place_dots, which calls this for Sampler::kBlue.
-/// Cost: some 6 CPU seconds and 1 GB a million dots.
+/// Cost: some 7 CPU seconds and 800 MB a million dots.
 DotSequence place_blue(const SurfaceCurve& curve, const ToneField& tone, const SampleOptions& options,
                        SampleReport* report = nullptr, const Progress& progress = {});
 

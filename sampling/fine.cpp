@@ -18,7 +18,7 @@ namespace {
 using Eigen::Vector3f;
 
 /// Steps of a dot, in pitches: they shrink from the first length to the last, as half a wave.
-constexpr float kFirstStep = .4f, kLastStep = .02f;
+constexpr float kFirstStep = .5f, kLastStep = .03f;
 /// It takes so many passes to find out how steep it is; until then steps are shorter.
 constexpr int kWarmUp = 4;
 /// How long a dot remembers which way it went, and how steep it was.

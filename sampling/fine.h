@@ -22,8 +22,8 @@ struct FineOptions {
 /// Moves the dots down the gradient of the squared error of the painted picture, blurred by one pitch (what F1 of the
 /// fidelity measures), all of them in each pass. Count, order, level and component stay; dots stay on the surface and
 /// on toned surface. Returns the best of all passes, so never a worse picture by this measure than it was given.
-/// Same bytes for any number of threads. Keeps some 1 kB a pitch squared of surface.
-/// Cost: CPU seconds some .1 a pass for 100,000 dots.
+/// Same bytes for any number of threads. Keeps some 1.5 kB a pitch squared of surface.
+/// Cost: CPU seconds some .5 a pass for 100,000 dots.
 /// @throws InputError if the spot has no size or there is less than one pass.
 DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots, const SpotModel& spot,
                         const FineOptions& options = {}, const Progress& progress = {});

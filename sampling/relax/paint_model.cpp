@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr double kNodesAPitch2 = 6;
+constexpr double kNodesAPitch2 = 9;
 /// Nodes of one blob; they hang together within one pitch and face about the same way.
 constexpr std::uint32_t kBlobNodes = 6;
 constexpr float kBlobCosine = .7f;

@@ -8,7 +8,7 @@
 /// The painted picture as `fine` sees it.
 namespace hilbrush {
 
-/// A small film of sampling's own: nodes of equal area all over the surface, six a pitch squared, laid along the same
+/// A small film of sampling's own: nodes of equal area all over the surface, nine a pitch squared, laid along the same
 /// curve as the dots. Dose is exact at nodes (spots at normal incidence, cut off and kept from thin walls as in
 /// sim/film/film_lattice.h). Errors are blurred through blobs of a few nodes each.
 class PaintModel {
