@@ -26,7 +26,8 @@ TEST(JobSettings, NothingGivenMeansTheDefaults) {
   EXPECT_EQ(
       job_settings_to_json(settings),
       R"({"dpi":100.0,"dots":null,"size_mm":null,"units_mm":null,"up":null,"untextured":"auto","sampler":"centroid",)"
-      R"("curve":"hilbert","seed":1,"max_incidence_deg":45.0,"preferred_incidence_deg":20.0,"cell":"default","dry_run":false})");
+      R"("curve":"hilbert","density":"texture","seed":1,"levels":1,"predictive_rounds":0,"largest_gap_pitches":null,)"
+      R"("fine_passes":24,"tone_curve":"calibrated","max_incidence_deg":45.0,"preferred_incidence_deg":20.0,"cell":"default","dry_run":false})");
 }
 
 TEST(JobSettings, OrderAndFormOfWhatWasGivenDoNotChangeTheCanonicalText) {
@@ -43,14 +44,21 @@ TEST(JobSettings, RoundTripOfRandomSettings) {
     if (random() % 2)
       settings.dpi = uniform(10, 1200);
     else
-      settings.dots = 1 + random() % 50'000'000;
+      settings.dots = 1 + random() % 1'000'000'000;
     if (random() % 2)
       settings.size_mm = uniform(1, 1000);
     else if (random() % 2)
       settings.units_mm = uniform(.001, 1000);
     if (random() % 2) settings.up = random() % 2 ? "y" : "z";
     settings.untextured = static_cast<Untextured>(random() % 3);
-    settings.sampler = static_cast<Sampler>(random() % 4);
+    settings.sampler = static_cast<Sampler>(random() % 10);
+    settings.curve = static_cast<CurveKind>(random() % 2);
+    settings.density = static_cast<DensitySource>(random() % 3);
+    settings.levels = 1 + static_cast<int>(random() % 4);
+    settings.predictive_rounds = static_cast<int>(random() % 5);
+    if (!settings.dots && random() % 2) settings.largest_gap_pitches = uniform(.7, 100);
+    settings.fine_passes = 1 + static_cast<int>(random() % 1000);
+    settings.tone_curve = static_cast<ToneMapping>(random() % 2);
     settings.seed = random();
     settings.max_incidence_deg = uniform(10, 45);
     settings.preferred_incidence_deg = uniform(0, settings.max_incidence_deg);
@@ -67,6 +75,13 @@ TEST(JobSettings, RoundTripOfRandomSettings) {
     EXPECT_EQ(back.up, settings.up);
     EXPECT_EQ(back.untextured, settings.untextured);
     EXPECT_EQ(back.sampler, settings.sampler);
+    EXPECT_EQ(back.curve, settings.curve);
+    EXPECT_EQ(back.density, settings.density);
+    EXPECT_EQ(back.levels, settings.levels);
+    EXPECT_EQ(back.predictive_rounds, settings.predictive_rounds);
+    EXPECT_EQ(back.largest_gap_pitches, settings.largest_gap_pitches);
+    EXPECT_EQ(back.fine_passes, settings.fine_passes);
+    EXPECT_EQ(back.tone_curve, settings.tone_curve);
     EXPECT_EQ(back.seed, settings.seed);
     EXPECT_EQ(back.max_incidence_deg, settings.max_incidence_deg);
     EXPECT_EQ(back.cell, settings.cell);
@@ -82,18 +97,33 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"dpi":9})", "$.dpi: expected a number from 10 to 1200, found 9"},
       {R"({"dpi":1201})", "$.dpi: expected a number from 10 to 1200, found 1201"},
       {R"({"dpi":"100"})", "$.dpi: expected a number from 10 to 1200, found \"100\""},
-      {R"({"dots":0})", "$.dots: expected a whole number from 1 to 50000000, found 0"},
-      {R"({"dots":50000001})", "$.dots: expected a whole number from 1 to 50000000, found 50000001"},
-      {R"({"dots":10.5})", "$.dots: expected a whole number from 1 to 50000000, found 10.5"},
+      {R"({"dots":0})", "$.dots: expected a whole number from 1 to 1000000000, found 0"},
+      {R"({"dots":1000000001})", "$.dots: expected a whole number from 1 to 1000000000, found 1000000001"},
+      {R"({"dots":10.5})", "$.dots: expected a whole number from 1 to 1000000000, found 10.5"},
       {R"({"dpi":100,"dots":1000})", "$.dots: contradicts dpi: give dpi or dots, not both"},
       {R"({"size_mm":0.5})", "$.size_mm: expected a number from 1 to 1000, found 0.5"},
       {R"({"size_mm":1001})", "$.size_mm: expected a number from 1 to 1000, found 1001"},
       {R"({"size_mm":80,"units_mm":1})", "$.units_mm: contradicts size_mm: give size_mm or units_mm, not both"},
       {R"({"up":"x"})", "$.up: expected \"y\" or \"z\", found \"x\""},
       {R"({"untextured":"maybe"})", "$.untextured: expected \"auto\", \"blank\" or \"material\", found \"maybe\""},
-      {R"({"sampler":"blue"})",
-       "$.sampler: expected \"centroid\", \"jittered\", \"even\" or \"random\", found \"blue\""},
-      {R"({"curve":"moore"})", "$.curve: expected \"hilbert\", found \"moore\""},
+      {R"({"sampler":"green"})",
+       "$.sampler: expected \"centroid\", \"jittered\", \"even\", \"random\", \"halton\", \"hammersley\", \"sobol\", "
+       "\"niederreiter\", \"blue\" or \"fine\", found \"green\""},
+      {R"({"curve":"moore"})", "$.curve: expected \"hilbert\", \"peano2\" or \"laminar\", found \"moore\""},
+      {R"({"curve":"laminar","sampler":"even"})",
+       "$.sampler: laminar slices place their dots in one way only: leave sampler out"},
+      {R"({"curve":"laminar","largest_gap_pitches":1})",
+       "$.largest_gap_pitches: laminar slices have no strata to fill"},
+      {R"({"dots":9,"largest_gap_pitches":1})",
+       "$.largest_gap_pitches: contradicts dots: filling holes adds to their number"},
+      {R"({"largest_gap_pitches":0.5})", "$.largest_gap_pitches: expected a number from 0.7 to 100, found 0.5"},
+      {R"({"density":"color"})",
+       "$.density: expected \"texture\", \"mean_curvature\" or \"gaussian_curvature\", found \"color\""},
+      {R"({"levels":5})", "$.levels: expected a whole number from 1 to 4, found 5"},
+      {R"({"levels":1.5})", "$.levels: expected a whole number from 1 to 4, found 1.5"},
+      {R"({"predictive_rounds":-1})", "$.predictive_rounds: expected a whole number from 0 to 4, found -1"},
+      {R"({"fine_passes":0})", "$.fine_passes: expected a whole number from 1 to 1000, found 0"},
+      {R"({"tone_curve":"none"})", "$.tone_curve: expected \"calibrated\" or \"linear\", found \"none\""},
       {R"({"seed":-1})", "$.seed: expected a whole number from 0 to 18446744073709551615, found -1"},
       {R"({"max_incidence_deg":46})", "$.max_incidence_deg: expected a number from 1 to 45, found 46"},
       {R"({"max_incidence_deg":30,"preferred_incidence_deg":31})",
@@ -136,6 +166,10 @@ TEST(JobSettings, NamesOfChoicesAreThoseOfTheFile) {
   EXPECT_STREQ(sampler_name(Sampler::kJittered), "jittered");
   EXPECT_STREQ(sampler_name(Sampler::kEven), "even");
   EXPECT_STREQ(sampler_name(Sampler::kRandom), "random");
+  EXPECT_STREQ(sampler_name(Sampler::kFine), "fine");
+  EXPECT_STREQ(curve_name(CurveKind::kLaminar), "laminar");
+  EXPECT_STREQ(density_name(DensitySource::kGaussianCurvature), "gaussian_curvature");
+  EXPECT_STREQ(tone_mapping_name(ToneMapping::kLinear), "linear");
   EXPECT_STREQ(untextured_name(Untextured::kAuto), "auto");
   EXPECT_STREQ(untextured_name(Untextured::kBlank), "blank");
   EXPECT_STREQ(untextured_name(Untextured::kMaterial), "material");

@@ -97,8 +97,11 @@ TEST_F(PipelineCommands, JsonIsTheResultAndNothingElse) {
 TEST_F(PipelineCommands, TheChildGetsAbsolutePathsAndCanonicalSettings) {
   use_child(std::string(kKeepArguments) + kResult);
   const std::string settings = folder_.write("job.json", R"({"dpi":300,"units_mm":1,"seed":4,"sampler":"even"})");
-  const CommandRun run = run_command({"plan", model_, "-o", path("a/../out"), "--settings", settings, "--dots", "5000",
-                                      "--size-mm", "80", "--sampler", "jittered", "--up", "z"});
+  const CommandRun run = run_command(
+      {"plan",    model_,          "-o",        path("a/../out"), "--settings", settings, "--dots",
+       "5000",    "--size-mm",     "80",        "--sampler",      "jittered",   "--up",   "z",
+       "--curve", "peano2",        "--density", "mean_curvature", "--levels",   "3",      "--predictive-rounds",
+       "2",       "--fine-passes", "7",         "--tone-curve",   "linear"});
   ASSERT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(child_arguments()[0], "plan");
   EXPECT_EQ(child_argument("--model"), model_);
@@ -110,6 +113,12 @@ TEST_F(PipelineCommands, TheChildGetsAbsolutePathsAndCanonicalSettings) {
   expected.up = "z";
   expected.sampler = Sampler::kJittered;
   expected.seed = 4;
+  expected.curve = CurveKind::kPeano2;
+  expected.density = DensitySource::kMeanCurvature;
+  expected.levels = 3;
+  expected.predictive_rounds = 2;
+  expected.fine_passes = 7;
+  expected.tone_curve = ToneMapping::kLinear;
   EXPECT_EQ(child_argument("--settings-json"), job_settings_to_json(expected));
 }
 
@@ -135,6 +144,17 @@ TEST_F(PipelineCommands, CalibrateNeedsNoModelAndPrintsTheCurve) {
   EXPECT_EQ(run.out, "  sampler:       even\n  wanted  asked\n  0.00    0.0000\n  1.00    1.6250\n");
 }
 
+TEST_F(PipelineCommands, CalibrateTakesReadingsOrWritesAWedge) {
+  use_child(std::string(kKeepArguments) + R"(echo '{"result":{"fields":16}}')");
+  const std::string readings = folder_.write("wedge_steps.json", "{}");
+  ASSERT_EQ(run_command({"calibrate", "-o", path("out"), "--measured", readings}).exit_code, kExitOk);
+  EXPECT_EQ(child_argument("--measured"), readings);
+  ASSERT_EQ(run_command({"calibrate", "-o", path("out"), "--wedge"}).exit_code, kExitOk);
+  EXPECT_EQ(child_arguments().back(), "--wedge");
+  EXPECT_EQ(run_command({"calibrate", "-o", path("out"), "--wedge", "--measured", readings}).exit_code, kExitUsage);
+  EXPECT_EQ(run_command({"calibrate", "-o", path("out"), "--measured", path("none.json")}).exit_code, kExitBadInput);
+}
+
 TEST_F(PipelineCommands, BadInputIsRefusedBeforeTheChildStarts) {
   use_child(kKeepArguments);
   const auto error = [&](std::vector<std::string> arguments) {
@@ -149,8 +169,10 @@ TEST_F(PipelineCommands, BadInputIsRefusedBeforeTheChildStarts) {
   EXPECT_EQ(error({"plan", model_, "--dpi", "5"}), "hilbrush: --dpi: expected a number from 10 to 1200, found 5\n");
   EXPECT_EQ(error({"plan", model_, "--size-mm", "8", "--units-mm", "1"}),
             "hilbrush: --units-mm: contradicts size_mm: give size_mm or units_mm, not both\n");
-  EXPECT_EQ(error({"plan", model_, "--sampler", "blue"}),
-            "hilbrush: --sampler: expected \"centroid\", \"jittered\", \"even\" or \"random\", found \"blue\"\n");
+  EXPECT_EQ(error({"plan", model_, "--levels", "5"}),
+            "hilbrush: --levels: expected a whole number from 1 to 4, found 5\n");
+  EXPECT_EQ(error({"plan", model_, "--tone-curve", "none"}),
+            "hilbrush: --tone-curve: expected \"calibrated\" or \"linear\", found \"none\"\n");
   const std::string settings = folder_.write("job.json", R"({"dpi":5})");
   EXPECT_EQ(error({"plan", model_, "--settings", settings}),
             "hilbrush: " + settings + ": $.dpi: expected a number from 10 to 1200, found 5\n");
