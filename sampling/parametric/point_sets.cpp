@@ -62,7 +62,8 @@ std::vector<Vector2d> jittered_grid(std::uint64_t count, std::uint64_t seed) {
   std::vector<Vector2d> points;
   points.reserve(side * side);
   for (std::uint64_t i = 0; i < side * side; ++i) {
-    const Vector2d corner(static_cast<double>(i % side), static_cast<double>(i / side));
+    const std::uint64_t column = i % side, row = i / side;
+    const Vector2d corner(static_cast<double>(column), static_cast<double>(row));
     const Vector2d offset(uniform_number(seed, 2 * i), uniform_number(seed, 2 * i + 1));
     points.emplace_back((corner + offset) / static_cast<double>(side));
   }
