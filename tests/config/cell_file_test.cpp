@@ -240,6 +240,51 @@ TEST(CellFile, ToneOptionsTakeTheCurveOfTheSampler) {
   EXPECT_EQ(even.reflectance_black, .1);
 }
 
+TEST(CellFile, ToneCurvesAreChosenByPlacementLevelsAndSpot) {
+  Json json = Json::parse(default_text());
+  const auto entry = [](const char* sampler, const char* curve, int levels, double spot, double black) {
+    return Json{{"sampler", sampler},   {"curve", curve},   {"levels", levels},
+                {"spot_pitches", spot}, {"wanted", {0, 1}}, {"asked", {0, black}}};
+  };
+  json["paint"]["tone_curves"] = {entry("centroid", "hilbert", 1, 1.4, 1.1), entry("centroid", "hilbert", 1, 2.8, 1.2),
+                                  entry("centroid", "peano2", 1, 1.4, 1.3),  entry("centroid", "hilbert", 3, 1.4, 1.4),
+                                  entry("centroid", "laminar", 1, 1.4, 1.5), entry("even", "peano2", 1, 1.4, 1.6)};
+  const CellDescription cell = cell_from_json(json.dump(), "");
+  std::string warning;
+  const auto black = [&](const char* sampler, const char* curve, int levels, double spot) {
+    const ToneCurve tone =
+        tone_options(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = spot}, warning).curve;
+    return tone.asked.empty() ? 0 : tone.asked.back();
+  };
+  EXPECT_EQ(black("centroid", "hilbert", 1, 1.41), 1.1);
+  EXPECT_EQ(warning, "");
+  EXPECT_EQ(black("centroid", "hilbert", 1, 2.7), 1.2);
+  EXPECT_EQ(black("centroid", "peano2", 1, 1.4), 1.3);
+  EXPECT_EQ(black("centroid", "hilbert", 3, 1.4), 1.4);
+  EXPECT_EQ(black("centroid", "laminar", 1, 1.4), 1.5);
+  EXPECT_EQ(warning, "");
+  EXPECT_EQ(black("even", "hilbert", 1, 1.4), 1.6);
+  EXPECT_NE(warning.find("that on curve \"peano2\" is used"), std::string::npos) << warning;
+  EXPECT_EQ(black("centroid", "hilbert", 2, 1.4), 0);
+  EXPECT_NE(warning.find("no tone curve for sampler \"centroid\" with 2 levels: tones will be off"), std::string::npos);
+  EXPECT_EQ(black("centroid", "hilbert", 1, 2), 1.1);
+  EXPECT_NE(warning.find("made for a spot of 1.4 pitches"), std::string::npos) << warning;
+}
+
+TEST(CellFile, TheShippedCellIsCalibratedForAllThatAJobCanName) {
+  const CellDescription cell = load_cell(shipped("default"));
+  for (const char* sampler :
+       {"centroid", "jittered", "even", "random", "halton", "hammersley", "sobol", "niederreiter", "blue"})
+    for (int levels = 1; levels <= 4; ++levels) {
+      std::string warning;
+      tone_options(cell, {.sampler = sampler, .curve = "hilbert", .levels = levels, .spot_pitches = 1.41}, warning);
+      EXPECT_EQ(warning, "") << sampler << ' ' << levels;
+    }
+  std::string warning;
+  tone_options(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}, warning);
+  EXPECT_EQ(warning, "");
+}
+
 TEST(CellFile, WarningsNameWhatIsAllowedButOdd) {
   const auto warnings = [](const char* key, const Json& value) {
     Json json = Json::parse(default_text());
