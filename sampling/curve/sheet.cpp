@@ -21,6 +21,7 @@ constexpr double kLeastQuads = 4000;
 /// four children.
 constexpr double kTooManyExponent = .926;
 constexpr int kDeepest = 24;
+constexpr double kCubeMargin = 1.05, kCubeMiddle = .4871828;
 /// A sound map lists each face in a few quads.
 constexpr std::size_t kMostListed = 1'000'000, kMostListedPerFace = 60;
 /// Rounding may not lose a triangle that touches a quad.
@@ -56,8 +57,9 @@ class TreeBuilder {
     if constexpr (kDimensions == 3) {
       Place low = Place::Constant(std::numeric_limits<double>::infinity()), high = -low;
       for (const Face& face : faces_) low = low.cwiseMin(face.low), high = high.cwiseMax(face.high);
-      const double size = (high - low).maxCoeff() * (1 + 1e-9);
-      divide(.5 * (low + high) - Place::Constant(size / 2), size, Curve{}, 0, all);
+      // Off the middle, so that no flat part lies on the plane between two cubes and counts in both.
+      const double size = (high - low).maxCoeff() * kCubeMargin;
+      divide(.5 * (low + high) - Place::Constant(kCubeMiddle * size), size, Curve{}, 0, all);
     } else {
       Curve curve{};
       std::vector<std::uint32_t> here;

@@ -281,9 +281,11 @@ bool open_cuts(CutDisk& cut, const std::vector<TriangleSide>& edges, const Marks
   return true;
 }
 
-void fill_holes(Disk& disk, std::size_t most_open) {
+/// All but the longest loop, if there are more holes than may be cut open.
+void fill_holes(Disk& disk, std::size_t most_holes) {
   const std::vector<BoundaryLoop> loops = sorted_loops(disk);
-  for (std::size_t i = std::max<std::size_t>(1, most_open + 1); i < loops.size(); ++i) disk.fill(loops[i]);
+  if (loops.size() <= most_holes + 1) return;
+  for (std::size_t i = 1; i < loops.size(); ++i) disk.fill(loops[i]);
 }
 
 }  // namespace

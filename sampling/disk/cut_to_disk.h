@@ -19,7 +19,7 @@ struct CutDisk {
 
 struct CutOptions {
   double area_share = 1;        ///< of the whole surface: what a component is worth refining for
-  std::size_t most_holes = 64;  ///< more boundaries than these, smallest first, are filled instead of cut open
+  std::size_t most_holes = 32;  ///< of more boundaries all but the longest are filled: slits between them make a maze
 };
 
 /// Coarse and blunt-angled triangulations are refined first, within bounds.
