@@ -120,8 +120,8 @@ class SurfaceQuality {
   /// Expected share of dots within a ball.
   double share_in_ball(const Eigen::Vector3d& centre_O, double radius_m) const;
 
-  /// Neighbours and holes: straight distances to dots where the surface faces the same way (mean normals over a quarter
-  /// of a dot's area, less than a right angle apart), so that the two sides of a thin wall are not neighbours.
+  /// Neighbours and holes: straight distances to dots where the surface does not face the other way (mean normals over
+  /// a quarter of a dot's area, less than 120 degrees apart), so that the two sides of a thin wall are not neighbours.
   Spacing spacing(std::span<const Dot> dots) const;
   /// Exact to 1e-3 of itself by branch and bound where the tone is constant; under a texture to 1/8 of a pitch.
   double largest_hole(std::span<const Dot> dots) const;

@@ -19,6 +19,9 @@ namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
+/// Cosine between normals below which two places are on two sides of a wall, and not on two sides of a crease.
+constexpr double kOpposite = -.5;
+
 /// Mass of each triangle, and whether it lies evenly on it.
 std::vector<double> measure_masses(const TexturedMesh& mesh, const ToneField* tone,
                                    std::vector<std::uint8_t>& is_even) {
@@ -207,7 +210,7 @@ Spacing SurfaceQuality::spacing(std::span<const Dot> dots) const {
   std::vector<double> distances(dots.size());
   tbb::parallel_for(std::size_t{0}, dots.size(), [&](std::size_t i) {
     const auto is_beside = [&](std::uint32_t other) {
-      return other != i && facing[dots[other].triangle].dot(facing[dots[i].triangle]) > 0;
+      return other != i && facing[dots[other].triangle].dot(facing[dots[i].triangle]) > kOpposite;
     };
     const double density = surface.density_at(dots[i].position_O, dots[i].triangle);
     distances[i] = tree.nearest(dots[i].position_O, is_beside).distance / densest * std::sqrt(density);
@@ -228,7 +231,7 @@ double SurfaceQuality::largest_hole(std::span<const Dot> dots) const {
   const auto distance = [&](const Vector3d& place, std::uint32_t face) {
     const double density = surface.density_at(place, face);
     if (!(density > 0)) return 0.;
-    const auto faces_alike = [&](std::uint32_t i) { return facing[dots[i].triangle].dot(facing[face]) > 0; };
+    const auto faces_alike = [&](std::uint32_t i) { return facing[dots[i].triangle].dot(facing[face]) > kOpposite; };
     double nearest = tree.nearest(place, faces_alike).distance;
     if (!std::isfinite(nearest)) nearest = tree.nearest(place, [](std::uint32_t) { return true; }).distance;
     return nearest * std::sqrt(density);
