@@ -1,7 +1,8 @@
 // Times the curve on a subdivided model: base tree, exact masses under a texture, and dots. Prints CPU and wall
 // seconds, patches, path constants, the worst mass of a stratum, memory, and an answer hash, which is the same for any
 // number of threads.
-//   curve_bench MODEL [TRIANGLES=268000] [TEXELS=2048] [MOST_DOTS=10000000] [STREAMED_DOTS=0] [FILE]
+//   curve_bench MODEL [TRIANGLES=268000] [TEXELS=2048] [MOST_DOTS=10000000] [STREAMED_DOTS FILE]
+//   curve_bench --leaves FILE.png     where the patches of a line drawing go, against all of them at the finest depth
 // STREAMED_DOTS go to FILE as binary PLY. Without textures of its own the model wears a picture of waves and lines, by
 // projection.
 #include <sys/resource.h>
@@ -23,6 +24,7 @@
 #include "sampling/model_file.h"
 #include "sampling/placement.h"
 #include "sampling/sample.h"
+#include "tests/support/meshes.h"
 #include "tests/support/subdivide.h"
 
 namespace {
@@ -211,15 +213,87 @@ void run(int argc, char** argv) {
               static_cast<unsigned long long>(*options.dot_count), argv[6], s.cpu, s.wall, before_mb, peak_mb());
 }
 
+/// Large flat areas and fine lines on a plate.
+TexturedMesh line_drawing(int texels) {
+  TexturedMesh mesh = test::with_texture(
+      test::rectangle(.05, .05, 4, 4), texels, texels,
+      [texels](int i, int j) {
+        const bool is_line = std::abs(i - texels / 6) < 2 || std::abs(j - texels / 2) < 1 || std::abs(i - j) < 2 ||
+                             std::abs(std::hypot(i - .6 * texels, j - .4 * texels) - .25 * texels) < 1.5;
+        return is_line ? .05 : .6;
+      },
+      false, false);
+  return mesh;
+}
+
+/// The drawing with the outline of each patch, as wide as the plate is.
+Picture leaf_picture(const CurveMass& mass, const TexturedMesh& mesh, const PatchRule& rule) {
+  const Texture& texture = mesh.textures[0];
+  Picture picture{texture.width, texture.height, 3, {}};
+  const auto n = static_cast<double>(texture.width);
+  for (int row = texture.height; row-- > 0;)
+    for (int i = 0; i < texture.width; ++i)
+      for (int c = 0; c < 3; ++c)
+        picture.pixels.push_back(static_cast<std::uint8_t>(
+            120 + 130 * texture.luminance[static_cast<std::size_t>(row * texture.width + i)]));
+  const auto mark = [&](double x, double y) {
+    const auto i = static_cast<std::size_t>(std::clamp(x / .05 * n, 0., n - 1));
+    const auto j = static_cast<std::size_t>(std::clamp((1 - y / .05) * n, 0., n - 1));
+    std::uint8_t* pixel = &picture.pixels[3 * (j * static_cast<std::size_t>(texture.width) + i)];
+    pixel[0] = 200, pixel[1] = 30, pixel[2] = 30;
+  };
+  visit_patches(mass, rule, [&](const Patch& patch) {
+    Eigen::Vector3d low = Eigen::Vector3d::Constant(1), high = -low;
+    for (const PatchPiece& piece : patch.pieces)
+      for (const Eigen::Vector2d& b : piece.corners_b) {
+        const Eigen::Vector3d p = position(mesh, {piece.triangle, {1 - b.sum(), b.x(), b.y()}});
+        low = low.cwiseMin(p), high = high.cwiseMax(p);
+      }
+    for (double x = low.x(); x < high.x(); x += .05 / n) mark(x, low.y());
+    for (double y = low.y(); y < high.y(); y += .05 / n) mark(low.x(), y);
+  });
+  return picture;
+}
+
+void compare_leaves(const char* file) {
+  constexpr std::uint64_t kDots = 200'000;
+  const TexturedMesh mesh = line_drawing(1024);
+  const SurfaceCurve curve(mesh);
+  const ToneField tone(mesh, {});
+  const CurveMass mass(curve, tone);
+  SampleOptions options;
+  options.dot_count = kDots;
+  SampleReport adaptive, uniform;
+  const DotSequence dots = place_dots(mass, options, &adaptive);
+  options.uniform_depth = static_cast<int>(adaptive.patches_at_depth.size()) - 1;
+  const DotSequence same = place_dots(mass, options, &uniform);
+  double apart = 0;
+  for (std::size_t i = 0; i < kDots; ++i)
+    apart += (dots.dots[i].position_O - same.dots[i].position_O).norm() / dots.pitch_m / static_cast<double>(kDots);
+  std::printf(
+      "%zu patches where the tone asks for them, %zu at depth %d all over (%.1f times): dots %.4f pitches apart\n",
+      adaptive.patch_count, uniform.patch_count, *options.uniform_depth,
+      static_cast<double>(uniform.patch_count) / static_cast<double>(adaptive.patch_count), apart);
+  for (std::size_t depth = 0; depth < adaptive.patches_at_depth.size(); ++depth)
+    if (adaptive.patches_at_depth[depth] > 0)
+      std::printf("  depth %2zu: %zu patches\n", depth, adaptive.patches_at_depth[depth]);
+  save_png(leaf_picture(mass, mesh, {mass.total_m2() / kDots, options.omega}), file);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "usage: curve_bench MODEL [TRIANGLES] [TEXELS] [MOST_DOTS] [STREAMED_DOTS FILE]\n");
+    std::fprintf(stderr,
+                 "usage: curve_bench MODEL [TRIANGLES] [TEXELS] [MOST_DOTS] [STREAMED_DOTS FILE]\n"
+                 "       curve_bench --leaves FILE.png\n");
     return 2;
   }
   try {
-    run(argc, argv);
+    if (argc == 3 && std::string(argv[1]) == "--leaves")
+      compare_leaves(argv[2]);
+    else
+      run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "curve_bench: %s\n", error.what());
     return 1;
