@@ -178,9 +178,12 @@ double ToneField::wanted_of_texture(const SurfacePoint& point) const {
   const Material& material = mesh_.materials[mesh_.material_index[point.triangle]];
   const Texture& texture = mesh_.textures[static_cast<std::size_t>(material.texture)];
   const double factor = texture.channels <= 2 ? interpolated_luminance(point) : 1;
-  return material.opacity *
+  // The coverage of four texels, divided once.
+  const double white = options_.reflectance_white, range = white - options_.reflectance_black;
+  return material.opacity / range *
          look_up(texture.width, texture.height, texel_at(point), addressing(point.triangle), [&](std::size_t i) {
-           return coverage(factor * texture.luminance[i]) * (texture.opacity.empty() ? 1 : texture.opacity[i]);
+           return std::clamp(white - factor * texture.luminance[i], 0., range) *
+                  (texture.opacity.empty() ? 1 : texture.opacity[i]);
          });
 }
 

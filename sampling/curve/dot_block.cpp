@@ -30,17 +30,21 @@ struct Lifted {
   bool is_inside = false;
 };
 
-Lifted lift(const std::vector<FaceFrame>& frames, const Vector2d& place) {
+/// `likely` is the frame to begin with, and then the one that was found: neighbours on the curve lie on few faces.
+Lifted lift(const std::vector<FaceFrame>& frames, const Vector2d& place, std::uint32_t& likely) {
   Lifted best;
   double deepest = -std::numeric_limits<double>::infinity();
   Vector2d best_along = Vector2d::Zero();
-  for (std::uint32_t i = 0; i < frames.size(); ++i) {
+  const auto count = static_cast<std::uint32_t>(frames.size());
+  std::uint32_t i = likely < count ? likely : 0;
+  for (std::uint32_t tried = 0; tried < count; ++tried, i = i + 1 == count ? 0 : i + 1) {
     const Vector2d along = frames[i].to_face * (place - frames[i].place);
     const double depth = std::min({along.x(), along.y(), 1 - along.x() - along.y()});
     if (!(depth > deepest)) continue;
     best.frame = i, deepest = depth, best_along = along;
     if (depth >= 0) break;
   }
+  likely = best.frame;
   best.is_inside = deepest >= -kOnSide;
   best_along = best_along.cwiseMax(0.);
   if (best_along.sum() > 1) best_along /= best_along.sum();
@@ -54,10 +58,32 @@ int curve_steps(double dots) {
   return dots < .5 ? 1 : dots < 30 ? 2 : dots < 2000 ? 3 : dots < 1e5 ? 4 : kMostCurveSteps;
 }
 
-template <class Curve>
-Vector2d mean_place(Curve curve, double from, double to, int steps) {
-  return (curve_moment(curve, to, steps) - curve_moment(curve, from, steps)) / (to - from);
-}
+/// Mean places of stretches of a curve. Where one ends, the next one most often begins.
+class CurveStretches {
+ public:
+  template <class Curve>
+  Vector2d mean_place(Curve curve, double from, double to, int steps) {
+    const Key key{Curve::kSide, curve.permutation, steps};
+    if (!(from == last_ && key == key_)) moment_ = curve_moment(curve, from, steps);
+    const Vector2d before = moment_;
+    moment_ = curve_moment(curve, to, steps);
+    last_ = to;
+    key_ = key;
+    return (moment_ - before) / (to - from);
+  }
+
+ private:
+  struct Key {
+    unsigned side = 0;  ///< of Curve: which one it is
+    std::uint8_t permutation = 0;
+    int steps = 0;
+    bool operator==(const Key&) const = default;
+  };
+
+  Key key_;
+  double last_ = -1;
+  Vector2d moment_ = Vector2d::Zero();  ///< up to last_
+};
 
 /// Puts one dot at the centre of each stratum.
 class CentreWriter {
@@ -146,8 +172,8 @@ class CentreWriter {
   void add_even(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
     const double mass = (to - from) * node.mass;
     const int steps = curve_steps(node.mass / plan_.rule.dot_mass);
-    const Vector2d place = node.low + node.size * mean_place(node.curve, from, to, steps);
-    const Lifted lifted = lift(walk.frames(), place);
+    const Vector2d place = node.low + node.size * stretches_.mean_place(node.curve, from, to, steps);
+    const Lifted lifted = lift(walk.frames(), place, likely_frame_);
     const FaceFrame& frame = walk.frames()[lifted.frame];
     StratumPart& part = begin_part(walk.sheet());
     part.moment_O += mass * frame.at(lifted.b);
@@ -189,10 +215,11 @@ class CentreWriter {
 
   /// Where a stretch of a small patch lies beside the patch's middle, as the curve runs.
   template <class Curve>
-  static void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
-                            double from, double to) {
-    const Lifted middle = lift(walk.frames(), node.low + Vector2d::Constant(.5 * node.size));
-    const Lifted there = lift(walk.frames(), node.low + node.size * mean_place(node.curve, from, to, 1));
+  void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
+                     double from, double to) {
+    const Lifted middle = lift(walk.frames(), node.low + Vector2d::Constant(.5 * node.size), likely_frame_);
+    const Vector2d place = node.low + node.size * stretches_.mean_place(node.curve, from, to, 1);
+    const Lifted there = lift(walk.frames(), place, likely_frame_);
     const FaceFrame &at_middle = walk.frames()[middle.frame], &at_there = walk.frames()[there.frame];
     const double mass = (to - from) * node.mass;
     part.moment_O += mass * (at_there.at(there.b) - at_middle.at(middle.b));
@@ -205,6 +232,8 @@ class CentreWriter {
   const DotPlan& plan_;
   std::vector<Dot>& dots_;
   Stratum stratum_;
+  CurveStretches stretches_;
+  std::uint32_t likely_frame_ = 0;
   bool is_new_ = true;  ///< nothing was added to the part before this patch
   std::size_t last_quad_ = 0;
 };
@@ -230,13 +259,13 @@ class PlaceWriter {
   /// Within a patch the mass is taken as even on what is painted of it: where the curve is on blank surface, or beside
   /// the surface, other places of the patch have their turn.
   template <class Curve>
-  SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double share) const {
+  SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double share) {
     if constexpr (QuadWalk<Curve>::kDimensions == 2) {
       const double dots = std::max(1., node.mass / plan_.rule.dot_mass);
       for (int i = 0; i < kMostTries; ++i) {
         const double at = share + std::fmod(i * std::numbers::phi, 1.) / dots;
         const Vector2d place = node.low + node.size * curve_place(node.curve, at - std::floor(at));
-        const Lifted lifted = lift(walk.frames(), place);
+        const Lifted lifted = lift(walk.frames(), place, likely_frame_);
         const SurfacePoint point = surface_point(walk.frames()[lifted.frame].triangle, lifted.b);
         if (lifted.is_inside && plan_.mass.tone.asked(point) > 0) return point;
       }
@@ -253,6 +282,7 @@ class PlaceWriter {
 
   const DotPlan& plan_;
   std::vector<Dot>& dots_;
+  std::uint32_t likely_frame_ = 0;
 };
 
 }  // namespace

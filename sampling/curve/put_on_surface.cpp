@@ -86,10 +86,14 @@ Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, c
   const DotSurface& surface = curve.dot_surfaces[place.triangle];
   // A beam that is aimed at the very edge of an open surface may pass it by.
   SurfacePoint point = place;
-  for (int c = 0; c < 3; ++c)
-    point.barycentric[c] =
-        std::max(point.barycentric[c], static_cast<double>(surface.least_barycentric[static_cast<std::size_t>(c)]));
-  point.barycentric /= point.barycentric.sum();
+  bool is_moved = false;
+  for (int c = 0; c < 3; ++c) {
+    const auto least = static_cast<double>(surface.least_barycentric[static_cast<std::size_t>(c)]);
+    if (point.barycentric[c] >= least) continue;
+    point.barycentric[c] = least;
+    is_moved = true;
+  }
+  if (is_moved) point.barycentric /= point.barycentric.sum();
   Dot dot;
   dot.position_O = position(curve.mesh, point);
   dot.normal_O = surface.normal;
