@@ -17,7 +17,7 @@ FaceFrame::FaceFrame(const Sheet& sheet, const TexturedMesh& mesh, const SheetFa
   const Eigen::Vector2d u = face.places[1] - place, v = face.places[2] - place;
   const double determinant = u.x() * v.y() - u.y() * v.x();
   to_face << v.y(), -v.x(), -u.y(), u.x();
-  to_face /= determinant;
+  to_face *= 1 / determinant;
   space = e1_O.cross(e2_O).norm();
   density = std::abs(face_to_b.determinant() / determinant) * space;
 }
@@ -97,10 +97,8 @@ void QuadWalk<Curve>::distribute(const Node& node, std::uint32_t piece, int axis
 /// Puts the lower and the upper part of a piece on the stack. One of their integrals is what the other leaves.
 template <class Curve>
 void QuadWalk<Curve>::halve(std::uint32_t index, int axis, double at) {
-  held_.resize(held_.size() + 2);
   const Held& whole = held_[index];
-  Held& lower = held_[held_.size() - 2];
-  Held& upper = held_[held_.size() - 1];
+  Held lower, upper;
   lower.frame = upper.frame = whole.frame;
   cut_piece(whole.piece, axis, at, lower.piece, upper.piece);
   const bool is_lower_smaller = lower.piece.area_b() < upper.piece.area_b();
@@ -111,6 +109,8 @@ void QuadWalk<Curve>::halve(std::uint32_t index, int axis, double at) {
   larger.integral = {all.area_m2 - part.area_m2, all.mass - part.mass, all.first - part.first,
                      std::max(0., all.square - part.square)};
   if (larger.integral.mass < kRoundingShare * all.mass) larger.integral = {};
+  held_.push_back(lower);
+  held_.push_back(upper);
 }
 
 template class QuadWalk<HilbertQuad>;

@@ -28,7 +28,7 @@ Index texel_index(Index i, int size, bool repeats) {
 
 /// The column (or row) that holds `x`, when walking in direction `step`. Without repeats all before texel 0 is column
 /// -1, and all after the last texel is the last column: the tone does not change there.
-Index column_of(double x, double step, int size, bool repeats) {
+inline Index column_of(double x, double step, int size, bool repeats) {
   if (!repeats) x = std::clamp(x, -.5, size - .5);
   const Index column = floor_index(x);
   // A walk to the left that begins on a grid line is in the column before it.
