@@ -34,13 +34,13 @@ enum class DensitySource {
 };
 
 struct SampleOptions {
-  std::optional<double> pitch_m;           ///< the count follows: mass / pitch^2, rounded
-  std::optional<std::uint64_t> dot_count;  ///< or exactly so many; the pitch follows
+  std::optional<double> pitch_m = {};           ///< the count follows: mass / pitch^2, rounded
+  std::optional<std::uint64_t> dot_count = {};  ///< or exactly so many; the pitch follows
   Sampler sampler = Sampler::kCentroid;
   std::uint64_t seed = 1;
-  double omega = 4;                      ///< a quad is split while it may misplace more than 1/omega of a dot
-  std::optional<int> uniform_depth;      ///< or: until it has this depth, whatever it holds; for comparison
-  std::uint64_t dot_limit = 50'000'000;  ///< more is an InputError that names dpi and size
+  double omega = 4;                       ///< a quad is split while it may misplace more than 1/omega of a dot
+  std::optional<int> uniform_depth = {};  ///< or: until it has this depth, whatever it holds; for comparison
+  std::uint64_t dot_limit = 50'000'000;   ///< more is an InputError that names dpi and size
 };
 
 }  // namespace hilbrush

@@ -45,6 +45,7 @@ void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass*
     pieces[i] = {integral.mass, centre.cast<float>(), static_cast<float>(integral.area_m2),
                  static_cast<float>(integral.square)};
     total += integral.mass;
+    result.painted_area_m2 += integral.area_m2;
     result.moment_O +=
         integral.mass * position(mass.curve.mesh, {face.triangle, {1 - centre.sum(), centre.x(), centre.y()}});
     if constexpr (kDimensions == 2) squares += integral.square * density_on_square(sheet, tone, face);
@@ -85,10 +86,8 @@ CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
     const QuadMass& quad = mass.quads[i];
     const PieceMass* pieces = mass.pieces_of(quad);
     double sum = 0;
-    for (std::uint32_t k = 0; k < mass.base_quad(quad).face_count; ++k) {
-      sum += pieces[k].mass;
-      if (pieces[k].mass > 0) mass.painted_area_m2[quad.sheet] += pieces[k].area_m2;
-    }
+    for (std::uint32_t k = 0; k < mass.base_quad(quad).face_count; ++k) sum += pieces[k].mass;
+    mass.painted_area_m2[quad.sheet] += quad.painted_area_m2;
     mass.mass_before[i + 1] = mass.mass_before[i] + sum;
   }
 }

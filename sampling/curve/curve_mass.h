@@ -22,6 +22,7 @@ struct QuadMass {
   /// Bound on the mass that lies elsewhere than if the quad's were spread evenly over its square.
   float misplaced = std::numeric_limits<float>::infinity();
   std::uint32_t depth = 0;
+  double painted_area_m2 = 0;                          ///< of the pieces that ask for dots
   Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times place
 };
 

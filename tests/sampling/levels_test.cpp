@@ -29,7 +29,9 @@ TEST(Levels, TheDensityCurveTimesTheLevelIsTheCurve) {
       const double wanted = i / 1000., asked = kCurve(wanted), level = levels[level_for(levels, asked)];
       EXPECT_NEAR(density(wanted), asked / level, 1e-3) << wanted << ' ' << count;
       EXPECT_EQ(dots_for(levels, asked), asked / level);
-      if (count > 1 && level < levels.back()) EXPECT_LE(density(wanted), kEnoughDots + 1e-9);
+      if (count > 1 && level < levels.back()) {
+        EXPECT_LE(density(wanted), kEnoughDots + 1e-9);
+      }
     }
   }
 }
@@ -42,7 +44,7 @@ TEST(Levels, FlatToneHasOneLevelThroughout) {
   const ToneField asked(mesh, options);
   options.curve = density_curve(kCurve, levels);
   const ToneField density(mesh, options);
-  DotSequence dots = place_dots(SurfaceCurve(mesh), density, {.pitch_m = .25e-3, .dot_count = {}});
+  DotSequence dots = place_dots(SurfaceCurve(mesh), density, {.pitch_m = .25e-3});
   assign_levels(dots, asked, density, levels);
   for (const Dot& dot : dots.dots)
     EXPECT_FLOAT_EQ(dot.level, static_cast<float>(levels[level_for(levels, kCurve(.5))]));
@@ -60,7 +62,7 @@ TEST(Levels, EnergiesAddUpToWhatIsAsked) {
     const ToneField asked(mesh, options);
     options.curve = density_curve(kCurve, levels);
     const ToneField density(mesh, options);
-    DotSequence dots = place_dots(SurfaceCurve(mesh), density, {.pitch_m = .25e-3, .dot_count = {}});
+    DotSequence dots = place_dots(SurfaceCurve(mesh), density, {.pitch_m = .25e-3});
     assign_levels(dots, asked, density, levels);
     double energy = 0;
     std::map<float, int> counts;
