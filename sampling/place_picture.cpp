@@ -58,9 +58,10 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
   const PredictiveOptions predictive{.rounds = options.predictive_rounds, .levels = options.levels};
   DotSequence dots = place_predictively(tone, density ? *density : tone, tone_options.curve, predictive, place, predict,
                                         &figures.predictive);
-  if (is_fine && !dots.dots.empty())
-    dots = refine_dots(curve, tone, std::move(dots), options.spot(dots.pitch_m), {.passes = options.fine_passes},
-                       next_part());
+  if (is_fine && !dots.dots.empty()) {
+    const SpotModel spot = options.spot(dots.pitch_m);
+    dots = refine_dots(curve, tone, std::move(dots), spot, {.passes = options.fine_passes}, next_part());
+  }
   figures.dots_of_level = count_levels(dots, options.levels);
   if (report) *report = std::move(figures);
   return dots;

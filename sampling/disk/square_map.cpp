@@ -159,64 +159,64 @@ struct MapTrial {
   std::vector<std::uint32_t> flipped;  ///< vertices of the flipped faces of the last map that had any
 
   explicit MapTrial(CutDisk& c)
-      : cut(c),
-        along(lengths_along(cut)),
-        corners(choose_corners(cut, along)),
-        boundary(place_boundary(cut, corners, along)) {
-    split_chords(cut.disk, boundary);
-    cut.outer = boundary_loops(cut.disk.neighbours()).front();  // splitting has moved sides about
-    graph = cotan_graph(cut.disk);
-    order = elimination_order(graph);
-    boundary_places.resize(static_cast<Eigen::Index>(boundary.places.size()), 2);
-    for (std::size_t v = 0; v < boundary.places.size(); ++v)
-      boundary_places.row(static_cast<Eigen::Index>(v)) = boundary.places[v];
-    const bool has_corners = !cut.is_cut || cut.forks.size() >= 4;
-    square_count = has_corners ? squares_for(side_lengths(corners, along), area_of(cut.disk)) : 1;
+      : cut_(c),
+        along_(lengths_along(cut_)),
+        corners_(choose_corners(cut_, along_)),
+        boundary_(place_boundary(cut_, corners_, along_)) {
+    split_chords(cut_.disk, boundary_);
+    cut_.outer = boundary_loops(cut_.disk.neighbours()).front();  // splitting has moved sides about
+    graph_ = cotan_graph(cut_.disk);
+    order_ = elimination_order(graph_);
+    boundary_places_.resize(static_cast<Eigen::Index>(boundary_.places.size()), 2);
+    for (std::size_t v = 0; v < boundary_.places.size(); ++v)
+      boundary_places_.row(static_cast<Eigen::Index>(v)) = boundary_.places[v];
+    const bool has_corners = !cut_.is_cut || cut_.forks.size() >= 4;
+    square_count_ = has_corners ? squares_for(side_lengths(corners_, along_), area_of(cut_.disk)) : 1;
   }
 
   void fix_boundary() {
-    Eigen::MatrixXd values = boundary_places;
-    if (solve_symmetric(graph, order, boundary.on_sides(kAllSides), values))
-      take(places_of(values, square_count, false), square_count);
+    Eigen::MatrixXd values = boundary_places_;
+    if (solve_symmetric(graph_, order_, boundary_.on_sides(kAllSides), values))
+      take(places_of(values, square_count_, false), square_count_);
   }
 
   void slide_boundary() {
-    Eigen::MatrixXd values = boundary_places;
-    if (!solve_symmetric(graph, order, boundary.on_sides(kLeft | kRight), values.col(0)) ||
-        !solve_symmetric(graph, order, boundary.on_sides(kBottom | kTop), values.col(1)))
+    Eigen::MatrixXd values = boundary_places_;
+    if (!solve_symmetric(graph_, order_, boundary_.on_sides(kLeft | kRight), values.col(0)) ||
+        !solve_symmetric(graph_, order_, boundary_.on_sides(kBottom | kTop), values.col(1)))
       return;
-    const double width = std::sqrt(energy(graph, values.col(1)) / energy(graph, values.col(0)));
+    const double width = std::sqrt(energy(graph_, values.col(1)) / energy(graph_, values.col(0)));
     const int count = static_cast<int>(std::lround(std::clamp(std::max(width, 1 / width), 1., kMostSquares)));
     take(places_of(values, count, width < 1), count);
   }
 
   void use_mean_values() {
-    Eigen::MatrixXd values = boundary_places;
-    if (solve_general(mean_value_graph(cut.disk), boundary.on_sides(kAllSides), values))
-      take(places_of(values, square_count, false), square_count);
+    Eigen::MatrixXd values = boundary_places_;
+    if (solve_general(mean_value_graph(cut_.disk), boundary_.on_sides(kAllSides), values))
+      take(places_of(values, square_count_, false), square_count_);
   }
 
  private:
   void take(std::vector<Vector2d> places, int count) {
-    if (count_flipped(cut.disk, places) > 0) {
+    if (count_flipped(cut_.disk, places) > 0) {
       flipped.clear();
-      for (const Triangle& face : cut.disk.faces())
+      for (const Triangle& face : cut_.disk.faces())
         if (is_flipped(face, places)) flipped.insert(flipped.end(), face.begin(), face.end());
       return;
     }
-    const Shear shear = mean_shear(cut.disk, places);
+    const Shear shear = mean_shear(cut_.disk, places);
     if (!best || shear.lengthening < best->lengthening)
       best = SquareMap{std::move(places), count, shear.ratio, shear.lengthening};
   }
 
-  CutDisk& cut;
-  std::vector<double> along;
-  Corners corners;
-  SquareBoundary boundary;
-  WeightedGraph graph;
-  std::vector<std::uint32_t> order;
-  Eigen::MatrixXd boundary_places;  ///< a row a vertex
-  int square_count = 1;             ///< with the boundary fixed
+  CutDisk& cut_;
+  std::vector<double> along_;
+  Corners corners_;
+  SquareBoundary boundary_;
+  WeightedGraph graph_;
+  std::vector<std::uint32_t> order_;
+  Eigen::MatrixXd boundary_places_;  ///< a row a vertex
+  int square_count_ = 1;             ///< with the boundary_ fixed
 };
 
 }  // namespace

@@ -121,7 +121,7 @@ std::vector<double> wedge_steps(std::vector<double> shares, double asked_max, st
   return shares;
 }
 
-ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max, std::span<const double> levels) {
+ToneCurve tone_curve_of(const std::vector<WedgeStep>& steps, double asked_max, std::span<const double> levels) {
   constexpr std::size_t kStepsMin = 5;
   constexpr int kTones = 40;  // fine enough that the bends of the wedge's own steps are kept
   constexpr double kJump = 1e-4;

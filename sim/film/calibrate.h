@@ -38,6 +38,6 @@ std::vector<double> wedge_steps(std::vector<double> shares, double asked_max, st
 /// (sampling/levels.h) each has steps of its own, and where the next level takes over the curve jumps: the same energy
 /// in fewer, stronger dots covers less.
 /// @throws InputError if it has fewer than five steps, or shows no paint at all.
-ToneCurve tone_curve_of(std::vector<WedgeStep> steps, double asked_max, std::span<const double> levels);
+ToneCurve tone_curve_of(const std::vector<WedgeStep>& steps, double asked_max, std::span<const double> levels);
 
 }  // namespace hilbrush
