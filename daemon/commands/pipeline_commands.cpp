@@ -11,6 +11,7 @@
 #include "config/json_reader.h"
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
+#include "daemon/commands/given_files.h"
 #include "daemon/commands/pipeline_run.h"
 #include "daemon/commands/progress_display.h"
 #include "daemon/commands/settings_flags.h"
@@ -23,7 +24,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr std::array kStages{"load", "disk", "curve", "dots", "plan", "check", "execute", "paint", "images"};
-constexpr std::size_t kReportBytesMax = 64u << 20;
 
 struct PipelineFlags {
   std::string command, model, output, program, emissions, measured;
@@ -37,24 +37,6 @@ std::string stage_text(const std::string& stage, double fraction) {
   if (const auto found = std::find(kStages.begin(), kStages.end(), stage); found != kStages.end())
     text += " (stage " + std::to_string(found - kStages.begin() + 1) + " of " + std::to_string(kStages.size()) + ")";
   return text;
-}
-
-std::string existing_file(const std::string& file, const char* what) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) throw InputError(file, std::string("no such ") + what);
-  if (fs::is_directory(status)) throw InputError(file, std::string("is a folder, not a ") + what);
-  return fs::absolute(file).lexically_normal().string();
-}
-
-/// The settings that made a program stand in the report beside it.
-std::string settings_beside(const std::string& program) {
-  const fs::path report = fs::path(program).parent_path() / "report.json";
-  std::error_code error;
-  if (!fs::exists(report, error)) return {};
-  const Json json = Json::parse(read_text_file(report.string(), kReportBytesMax), nullptr, false);
-  const Json& settings = member(json, "settings");
-  return settings.is_object() ? settings.dump() : std::string();
 }
 
 std::vector<std::string> child_arguments(const PipelineFlags& flags, const JobSettings& settings,

@@ -13,6 +13,7 @@
 #include "config/json_reader.h"
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
+#include "daemon/commands/given_files.h"
 #include "daemon/commands/pipeline_run.h"
 #include "daemon/commands/progress_display.h"
 #include "daemon/commands/text_output.h"
@@ -23,8 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-constexpr std::size_t kReportBytesMax = 64u << 20;
 
 struct QualityFlags {
   std::string set, model, output, settings;
@@ -40,18 +39,9 @@ std::string settings_of(const QualityFlags& flags) {
   std::error_code error;
   if (!fs::exists(report, error))
     throw InputError(flags.set, "has no report.json beside it that says how the model was placed: give --settings");
-  const Json json = Json::parse(read_text_file(report.string(), kReportBytesMax), nullptr, false);
-  const Json& settings = member(json, "settings");
-  if (!settings.is_object()) throw InputError(report.string(), "holds no settings: give --settings");
-  return settings.dump();
-}
-
-std::string existing_file(const std::string& file, const char* what) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) throw InputError(file, std::string("no such ") + what);
-  if (fs::is_directory(status)) throw InputError(file, std::string("is a folder, not a ") + what);
-  return fs::absolute(file).lexically_normal().string();
+  const std::string settings = settings_beside(flags.set);
+  if (settings.empty()) throw InputError(report.string(), "holds no settings: give --settings");
+  return settings;
 }
 
 std::string request_of(const QualityFlags& flags) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sampling/curve/quad_walk.h"
+#include "sampling/nearest_in_triangle.h"
 
 namespace hilbrush {
 namespace {
@@ -14,29 +15,10 @@ using Eigen::Vector3d;
 constexpr int kLongestWalk = 64;
 constexpr int kMostHalvings = 40;
 
-/// Barycentric coordinates of the point of a triangle that is nearest to `p` (Ericson, Real-Time Collision
-/// Detection, 5.1.5).
-Vector3d nearest_in(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& p) {
-  const Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return {1 - d1 / (d1 - d3), d1 / (d1 - d3), 0};
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return {1 - d2 / (d2 - d6), 0, d2 / (d2 - d6)};
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - w, w};
-  }
-  const double sum = va + vb + vc;
-  return {va / sum, vb / sum, vc / sum};
-}
-
 }  // namespace
 
 NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& target) {
-  NearestPoint nearest{{t, nearest_in(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2), target)}, 0};
+  NearestPoint nearest{{t, nearest_in_triangle(target, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2))}, 0};
   nearest.distance2 = (position(mesh, nearest.point) - target).squaredNorm();
   return nearest;
 }

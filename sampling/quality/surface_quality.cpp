@@ -10,6 +10,7 @@
 
 #include "sampling/check.h"
 #include "sampling/input_error.h"
+#include "sampling/nearest_in_triangle.h"
 #include "sampling/quality/holes.h"
 #include "sampling/quality/point_tree.h"
 #include "sampling/quality/spacing.h"

@@ -78,9 +78,4 @@ class TriangleTree {
   std::vector<Node> nodes_;  ///< a heap: the children of node n are 2n + 1 and 2n + 2
 };
 
-/// The point of a triangle that is nearest to `place`, in barycentric coordinates. After Ericson, "Real-Time Collision
-/// Detection", section 5.1.5.
-Eigen::Vector3d nearest_in_triangle(const Eigen::Vector3d& place, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                    const Eigen::Vector3d& c);
-
 }  // namespace hilbrush

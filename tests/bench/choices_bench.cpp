@@ -1,7 +1,6 @@
 // The thesis's other choices, timed: curves and area methods on parametric surfaces, laminar slices and hole filling on
 // a model. Prints CPU seconds, what was measured, and an answer hash.
 //   choices_bench [MODEL] [DOTS=1500000]
-#include <sys/resource.h>
 
 #include <cmath>
 #include <cstdio>
@@ -17,17 +16,11 @@
 #include "sampling/placement.h"
 #include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
+#include "tests/bench/process_usage.h"
 
 namespace {
 
 using namespace hilbrush;
-
-double cpu_now() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
 
 template <class Dots>
 double path_length(const Dots& dots, auto place) {
@@ -49,9 +42,9 @@ void time_sphere(std::uint64_t count, AnswerHash& hash) {
         options.area = method;
         options.sampler = sampler;
         options.minimum_depth = options.maximum_depth = curve == CurveKind::kHilbert ? 12 : 8;
-        const double start = cpu_now();
+        const double start = cpu_s();
         const ParametricSamples samples = sample_parametric(*sphere, options);
-        const double seconds = cpu_now() - start;
+        const double seconds = cpu_s() - start;
         const double path = path_length(samples.dots, [](const ParametricDot& dot) { return dot.position; }) /
                             std::sqrt(static_cast<double>(count) * 4 * std::numbers::pi);
         hash.take(path);
@@ -74,11 +67,11 @@ void time_model(const char* file, std::uint64_t count, AnswerHash& hash) {
   SampleOptions options;
   options.dot_count = count;
 
-  double start = cpu_now();
+  double start = cpu_s();
   SampleReport report;
   const DotSequence laminar = place_laminar(mesh, tone, options, &report);
   std::printf("laminar: %zu dots, pitch %.6f mm, path constant %.4f, %.2f CPU s\n", laminar.dots.size(),
-              1e3 * laminar.pitch_m, report.path_constant, cpu_now() - start);
+              1e3 * laminar.pitch_m, report.path_constant, cpu_s() - start);
   hash.take(report.path_length_m);
 
   for (const Sampler sampler : {Sampler::kJittered, Sampler::kCentroid})
@@ -88,13 +81,13 @@ void time_model(const char* file, std::uint64_t count, AnswerHash& hash) {
       const auto place = [](const Dot& dot) { return dot.position_O; };
       const double before = path_length(dots.dots, place);
       FillReport filled;
-      start = cpu_now();
+      start = cpu_s();
       const DotSequence all = fill_holes(curve, tone, dots, gap, &filled);
       const double after = path_length(all.dots, place);
       std::printf("%s, largest gap %.1f: %llu dots added (%llu by the sweep), path x %.4f, %.2f CPU s\n",
                   sampler == Sampler::kCentroid ? "centroid" : "jittered", gap,
                   static_cast<unsigned long long>(filled.added), static_cast<unsigned long long>(filled.added_by_sweep),
-                  after / before, cpu_now() - start);
+                  after / before, cpu_s() - start);
       hash.take(after);
     }
 }

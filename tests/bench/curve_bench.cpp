@@ -5,7 +5,6 @@
 //   curve_bench --leaves FILE.png     where the patches of a line drawing go, against all of them at the finest depth
 // STREAMED_DOTS go to FILE as binary PLY. Without textures of its own the model wears a picture of waves and lines, by
 // projection.
-#include <sys/resource.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -24,6 +23,7 @@
 #include "sampling/model_file.h"
 #include "sampling/placement.h"
 #include "sampling/sample.h"
+#include "tests/bench/process_usage.h"
 #include "tests/support/meshes.h"
 #include "tests/support/subdivide.h"
 
@@ -39,22 +39,15 @@ struct Seconds {
   double cpu = 0, wall = 0;
 };
 
-double cpu_now() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
-
 /// Best of several.
 template <class Work>
 Seconds time(int repeats, Work work) {
   Seconds best{1e300, 1e300};
   for (int i = 0; i < repeats; ++i) {
     const auto wall = std::chrono::steady_clock::now();
-    const double cpu = cpu_now();
+    const double cpu = cpu_s();
     work();
-    best.cpu = std::min(best.cpu, cpu_now() - cpu);
+    best.cpu = std::min(best.cpu, cpu_s() - cpu);
     best.wall = std::min(best.wall, std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
   }
   return best;

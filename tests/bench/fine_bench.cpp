@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <string>
 #include <vector>
 
@@ -15,14 +14,11 @@
 #include "sampling/model_file.h"
 #include "sampling/placement.h"
 #include "sim/film/fidelity.h"
+#include "tests/bench/process_usage.h"
 
 namespace {
 
 using namespace hilbrush;
-
-double cpu_s() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 SurfacePoint point_of(const TexturedMesh& mesh, const Dot& dot) {
   const Eigen::Vector3d area = mesh.area_vector(dot.triangle);

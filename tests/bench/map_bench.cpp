@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <map>
 #include <string>
 #include <vector>
@@ -17,15 +16,12 @@
 #include "sampling/model_file.h"
 #include "sampling/placement.h"
 #include "sampling/sample.h"
+#include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"
 
 namespace {
 
 using namespace hilbrush;
-
-double cpu_s() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 /// CPU seconds by stage; the best of all repeats.
 class Stages {

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <limits>
 #include <stdexcept>
 
@@ -20,6 +19,7 @@
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"
 #include "sampling/placement.h"
+#include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"
 
 namespace {
@@ -27,10 +27,6 @@ namespace {
 using namespace hilbrush;
 namespace parameterization = CGAL::Surface_mesh_parameterization;
 using RivalMesh = CGAL::Surface_mesh<CGAL::Simple_cartesian<double>::Point_3>;
-
-double cpu_s() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 TexturedMesh read(const char* file, std::size_t triangles) {
   const auto no_image = [](const std::filesystem::path&, std::size_t, std::string& reason) {

@@ -5,7 +5,6 @@
 //   ours painted_bench run MODEL SIZE_MM DPI [loop|plain]    one run, with its time and memory
 //
 // Dots are exposed at normal incidence by a perfect cell; what the cell adds is in the dry runs of RESULTS.md.
-#include <sys/resource.h>
 
 #include <array>
 #include <cmath>
@@ -29,23 +28,11 @@
 #include "sim/film/fidelity.h"
 #include "sim/film/orthographic_view.h"
 #include "sim/film/picture_means.h"
+#include "tests/bench/process_usage.h"
 
 namespace {
 
 using namespace hilbrush;
-
-double cpu_s() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
-
-double peak_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;
-}
 
 /// A way to place dots, by the settings a job would have.
 struct Way {

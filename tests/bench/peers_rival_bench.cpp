@@ -5,7 +5,6 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <string>
 
 #include "sampling/images/image_file.h"
@@ -14,15 +13,12 @@
 #include "sampling/placement.h"
 #include "sampling/quality.h"
 #include "sampling/sample.h"
+#include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"
 
 namespace {
 
 using namespace hilbrush;
-
-double cpu_s() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 TexturedMesh black_mesh(const std::string& file, std::size_t triangles) {
   PlacementOptions placement;

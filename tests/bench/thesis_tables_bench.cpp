@@ -89,17 +89,20 @@ struct PlaneMethod {
   std::array<double, 3> of_thesis{};
 };
 
+/// Dots on a surface by one way to make them; the count is the seed, too.
+std::vector<ParametricDot> dots_on(ParametricShape shape, ParametricOptions options, std::uint64_t count) {
+  options.dot_count = options.seed = count;
+  return sample_parametric(*make_surface(shape), options).dots;
+}
+
 PlaneMethod on_curve(const std::string& name, CurveKind curve, Sampler sampler, std::array<double, 3> of_thesis = {}) {
   return {name,
           [=](std::uint64_t count) {
-            static const auto plane = make_surface(ParametricShape::kPlane);
             ParametricOptions options;
-            options.dot_count = count;
             options.curve = curve;
             options.sampler = sampler;
-            options.seed = count;
             std::vector<Vector2d> points;
-            for (const ParametricDot& dot : sample_parametric(*plane, options).dots) points.push_back(dot.uv);
+            for (const auto& dot : dots_on(ParametricShape::kPlane, options, count)) points.push_back(dot.uv);
             return points;
           },
           of_thesis};
@@ -162,14 +165,11 @@ SphereMethod sphere_rival(const std::string& name, PlaneSet kind, double of_thes
 SphereMethod sphere_curve(const std::string& name, AreaMethod area, Sampler sampler, double of_thesis) {
   return {name,
           [=](std::uint64_t count) {
-            static const auto sphere = make_surface(ParametricShape::kSphere);
             ParametricOptions options;
-            options.dot_count = count;
             options.area = area;
             options.sampler = sampler;
-            options.seed = count;
             std::vector<Vector3d> points;
-            for (const ParametricDot& dot : sample_parametric(*sphere, options).dots) points.push_back(dot.position);
+            for (const auto& dot : dots_on(ParametricShape::kSphere, options, count)) points.push_back(dot.position);
             return points;
           },
           of_thesis};

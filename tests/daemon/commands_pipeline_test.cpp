@@ -18,21 +18,12 @@ namespace hilbrush {
 namespace {
 
 using commands_test::CommandRun;
+using commands_test::kKeepArguments;
 using commands_test::run_command;
-using commands_test::TemporaryFolder;
 using Json = nlohmann::ordered_json;
 
-class PipelineCommands : public testing::Test {
+class PipelineCommands : public commands_test::ScriptedChild {
  protected:
-  void TearDown() override { unsetenv("HILBRUSH_PIPELINE"); }
-
-  /// A shell script as the child; $folder is the test's folder.
-  void use_child(const std::string& script) {
-    const std::string program =
-        folder_.write("child", "#!/bin/sh\nfolder='" + folder_.path().string() + "'\n" + script + "\n", true);
-    setenv("HILBRUSH_PIPELINE", program.c_str(), 1);
-  }
-  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
   std::string read(const std::string& name) const { return read_text_file(path(name), 1u << 20); }
 
   /// What the child was called with, one argument a line.
@@ -49,11 +40,9 @@ class PipelineCommands : public testing::Test {
     return "(none)";
   }
 
-  TemporaryFolder folder_;
   const std::string model_ = folder_.write("cup.wrl", "#VRML V2.0 utf8\n");
 };
 
-constexpr const char* kKeepArguments = "for a in \"$@\"; do echo \"$a\"; done > \"$folder/arguments\"\n";
 constexpr const char* kResult =
     R"(echo '{"result":{"mesh":{"file":"cup.wrl"},"dots":{"placed":10,"exposed":9,"skipped":{"occluded":1}},"time_s":{"total":75}}}')";
 

@@ -17,20 +17,10 @@ using commands_test::CommandRun;
 using commands_test::run_command;
 using Json = nlohmann::ordered_json;
 
-class QualityCommand : public testing::Test {
+class QualityCommand : public commands_test::ScriptedChild {
  protected:
-  void TearDown() override { unsetenv("HILBRUSH_PIPELINE"); }
-
-  /// A shell script as the child; $folder is the test's folder. It keeps its arguments, one a line.
-  void use_child(const std::string& script) {
-    const std::string program =
-        folder_.write("child",
-                      "#!/bin/sh\nfolder='" + folder_.path().string() +
-                          "'\nfor a in \"$@\"; do echo \"$a\"; done > \"$folder/arguments\"\n" + script + "\n",
-                      true);
-    setenv("HILBRUSH_PIPELINE", program.c_str(), 1);
-  }
-  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  /// A script that also keeps its arguments.
+  void use_child(const std::string& script) { ScriptedChild::use_child(commands_test::kKeepArguments + script); }
   bool child_ran() const { return std::filesystem::exists(path("arguments")); }
 
   /// What the child was asked.
@@ -40,8 +30,6 @@ class QualityCommand : public testing::Test {
     for (int i = 0; i < 3; ++i) std::getline(in, line);  // quality, --request-json, {...}
     return Json::parse(line);
   }
-
-  commands_test::TemporaryFolder folder_;
 };
 
 constexpr const char* kEmptyResult = R"(echo '{"result":{"sizes":[]}}')";

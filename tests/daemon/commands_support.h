@@ -1,4 +1,7 @@
 #pragma once
+#include <gtest/gtest.h>
+
+#include <cstdlib>
 #include <functional>
 #include <sstream>
 #include <string>
@@ -67,5 +70,23 @@ struct CommandRun {
 /// pipe.
 CommandRun run_command(const std::vector<std::string>& arguments, bool is_terminal = false,
                        const char* input = nullptr);
+
+/// For commands that run hilbrush-pipeline: a shell script takes its place.
+class ScriptedChild : public testing::Test {
+ protected:
+  void TearDown() override { unsetenv("HILBRUSH_PIPELINE"); }
+
+  /// $folder is the test's folder.
+  void use_child(const std::string& script) {
+    const std::string program =
+        folder_.write("child", "#!/bin/sh\nfolder='" + folder_.path().string() + "'\n" + script + "\n", true);
+    setenv("HILBRUSH_PIPELINE", program.c_str(), 1);
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  TemporaryFolder folder_;
+};
+/// For the script: the child's arguments go to $folder/arguments, one a line.
+inline constexpr const char* kKeepArguments = "for a in \"$@\"; do echo \"$a\"; done > \"$folder/arguments\"\n";
 
 }  // namespace hilbrush::commands_test
