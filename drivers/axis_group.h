@@ -10,6 +10,7 @@
 ///   enable()   connected -> enabled: drives on; joints can be read.
 ///   home()     enabled -> ready: may move. A group that keeps its reference may be ready at once.
 ///   move_to()  ready -> moving -> ready when every axis is in position and settled.
+///   A lost link is a fault with a sentence; clear_fault() connects again.
 ///   stop()     moving -> enabled-but-stopped (ready again at once): decelerates; from any thread, idempotent, never
 ///   throws. disable()  any but disconnected -> connected. clear_fault() fault -> connected.
 /// Unless said otherwise, calls come from the executor's thread only, and throw DriverError on refusal, silence or
@@ -29,6 +30,8 @@ class AxisGroup {
     Positions positions{};     ///< measured
     bool in_position = false;  ///< at the last target, settled
     std::string fault;         ///< a sentence, if state is kFault
+    /// When the first frame or reply came that showed it in position and settled, on the cell's clock; 0 if unknown.
+    double in_position_since_s = 0;
   };
 
   virtual ~AxisGroup() = default;
@@ -41,7 +44,14 @@ class AxisGroup {
   /// ready. `settle_s`: how long the axes must have been at rest before in_position is reported, as the time model
   /// foresees.
   virtual void move_to(const Positions& target, double settle_s) = 0;
-  /// From any thread.
+  /// How many further targets move_to() takes while a move is under way: they are visited in order, each at rest;
+  /// in_position is about the last of them, and stop() forgets them all.
+  virtual std::size_t look_ahead() const { return 0; }
+  /// What can be sent ahead of the next move_to() (a set-point without its trigger), called while a pulse is on:
+  /// nothing may move. A hint, which the next move_to() need not follow.
+  virtual void prepare(const Positions& /*target*/, double /*settle_s*/) {}
+  /// What is known by the last frame or reply: cheap, never waits for the device. When the answer changes in state,
+  /// fault or in_position, devices that learn it by themselves wake the cell's clock. From any thread.
   virtual Status status() = 0;
   /// The device's own estimate of when in_position can become true, on the cell's clock; a hint for polling. now if
   /// unknown.

@@ -15,6 +15,8 @@ class Laser {
     bool is_emitting = false;
     bool interlock_closed = false;
     std::string fault;
+    /// When the first frame or reply came that showed the last pulse over, on the cell's clock; 0 if unknown.
+    double dark_since_s = 0;
   };
   struct Limits {
     double power_min_w = 0, power_max_w = 0, pulse_min_s = 0, pulse_max_s = 0;
@@ -32,7 +34,9 @@ class Laser {
   virtual void fire(double power_w, double pulse_s) = 0;
   /// The gate off, now. From any thread, idempotent, never throws. True if the device confirms that it is off.
   virtual bool off() noexcept = 0;
-  virtual Status status() = 0;  ///< from any thread
+  /// As AxisGroup::status(): cheap, wakes the cell's clock when is_emitting, interlock or fault change. From any
+  /// thread.
+  virtual Status status() = 0;
   virtual void clear_fault() = 0;
 };
 
