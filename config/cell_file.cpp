@@ -46,6 +46,23 @@ void read_arm(JsonObject& json, CellDescription::Arm& arm) {
   arm.quill_radius_m = json.quantity("quill_radius_mm", {0, 500});
 }
 
+/// The links run above all that the lens can reach, unless the file says where, and the quill ends in the forearm.
+void read_links(JsonObject& json, const AxisDescription& j3, const CellDescription::Lens& lens,
+                CellDescription::Arm& arm) {
+  constexpr double kRadiusM = .035, kGapM = .03;
+  const auto or_else = [&json](const char* key, JsonRange range, double otherwise) {
+    return json.has(key) ? json.quantity(key, range) : otherwise;
+  };
+  const double lens_top_m = (lens.far_m - arm.flange_to_focus_m) * std::sin(arm.beam_depression) +
+                            lens.radius_m * std::cos(arm.beam_depression);
+  arm.fore_link.radius_m = or_else("forearm_radius_mm", {0, 1000}, kRadiusM);
+  arm.fore_link.height_m =
+      or_else("forearm_height_mm", {-5000, 5000}, j3.max + std::max(lens_top_m, 0.) + kGapM + arm.fore_link.radius_m);
+  arm.upper_link.radius_m = or_else("upper_arm_radius_mm", {0, 1000}, arm.fore_link.radius_m);
+  arm.upper_link.height_m = or_else("upper_arm_height_mm", {-5000, 5000}, arm.fore_link.height_m);
+  arm.quill_length_m = or_else("quill_length_mm", {0, 5000}, std::max(arm.fore_link.height_m - j3.min, .001));
+}
+
 void read_lens(JsonObject& json, CellDescription::Lens& lens) {
   lens.radius_m = json.quantity("radius_mm", {0.1, 500});
   lens.near_m = json.quantity("near_mm", {0.1, 2000});
@@ -137,8 +154,11 @@ CellDescription read_cell(JsonObject& json) {
       axes.object(kAxisNames[i], [&](JsonObject& axis) { cell.axes[i] = read_axis(axis, static_cast<AxisIndex>(i)); });
   });
   cell.limit_margin = json.number("limit_margin", {0, 0.4});
-  json.object("arm", [&](JsonObject& arm) { read_arm(arm, cell.arm); });
   json.object("lens", [&](JsonObject& lens) { read_lens(lens, cell.lens); });
+  json.object("arm", [&](JsonObject& arm) {
+    read_arm(arm, cell.arm);
+    read_links(arm, cell.axes[kJ3], cell.lens, cell.arm);
+  });
   json.object("table", [&](JsonObject& table) { read_table(table, cell.table); });
   json.object("fixture", [&](JsonObject& fixture) { read_fixture(fixture, cell.fixture); });
   json.object("laser", [&](JsonObject& laser) { read_laser(laser, cell.laser); });
@@ -198,6 +218,9 @@ std::vector<std::string> cell_warnings(const CellDescription& cell) {
     warn("$.lens.near_mm", "the lens comes closer to the focus than its own radius: most oblique beams will collide");
   if (cell.lens.far_m < cell.arm.flange_to_focus_m)
     warn("$.lens.far_mm", "the lens body ends before it reaches the flange");
+  const auto& fore = cell.arm.fore_link;
+  if (fore.radius_m > 0 && cell.axes[kJ3].max > fore.height_m - fore.radius_m)
+    warn("$.arm.forearm_height_mm", "the flange would run into the forearm at the top of J3");
   if (cell.paint.tone_curves.empty())
     warn("$.paint.tone_curves", "none: pictures lose 14 to 18 dB without one; `hilbrush calibrate` makes it");
   const double reach =

@@ -145,7 +145,7 @@ struct PlannedWork {
 
 std::vector<std::string> skip_reason_names() {
   std::vector<std::string> names{"exposed"};
-  for (int r = 0; r <= static_cast<int>(SkipReason::kEnergy); ++r)
+  for (int r = 0; r < kSkipReasonCount; ++r)
     names.emplace_back(skip_reason_name(static_cast<SkipReason>(r)));
   return names;
 }

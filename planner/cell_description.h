@@ -57,6 +57,11 @@ struct CellDescription {
     double beam_depression = 0;  ///< rad
     double flange_to_focus_m = 0;
     double quill_radius_m = 0;  ///< the vertical shaft above the flange
+    double quill_length_m = .25;
+    struct Link {  ///< a capsule around the horizontal line between the axes of two joints
+      double height_m = 0;  ///< of that line, in W
+      double radius_m = 0;  ///< 0: no link
+    } upper_link, fore_link;
   } arm;
   struct Lens {  ///< a cylinder around the beam, behind the focus
     double radius_m = 0, near_m = 0, far_m = 0;

@@ -13,7 +13,6 @@ namespace hilbrush {
 namespace {
 
 constexpr int kRimRays = 15, kBundleRays = 16;  // one packet: the rim, and the axis
-constexpr double kQuillLengthM = .2;
 constexpr double kMillimetre = 1e-3;
 
 std::string millimetres(double length_m) {
@@ -60,24 +59,29 @@ CheckCell::CheckCell(const TexturedMesh& mesh, const CellDescription& cell)
       rays_(std::make_unique<Rays>(mesh)) {
   const double focus_m = cell.arm.flange_to_focus_m;
   lens_ = {(focus_m - cell.lens.far_m) * beam_F_, beam_F_, cell.lens.far_m - cell.lens.near_m, cell.lens.radius_m};
-  quill_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), kQuillLengthM, cell.arm.quill_radius_m};
+  quill_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), cell.arm.quill_length_m, cell.arm.quill_radius_m};
   reach_m_ = std::hypot(cell.table.plate_radius_m, cell.fixture.post_height_m + cell.table.plate_thickness_m);
   for (const auto& p : mesh.vertices) reach_m_ = std::max(reach_m_, p.norm());
 }
 
 CheckCell::~CheckCell() = default;
 
-Eigen::Isometry3d CheckCell::X_OF(const Joints& joints) const {
+Eigen::Isometry3d CheckCell::X_WF(const Joints& joints) const {
   using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
-  const Eigen::Isometry3d X_WF =
-      AngleAxisd(joints[kJ1], Vector3d::UnitZ()) * Translation3d(cell_.arm.upper_arm_m, 0, 0) *
-      AngleAxisd(joints[kJ2], Vector3d::UnitZ()) * Translation3d(cell_.arm.forearm_m, 0, joints[kJ3]) *
-      AngleAxisd(joints[kJ4], Vector3d::UnitZ());
+  return AngleAxisd(joints[kJ1], Vector3d::UnitZ()) * Translation3d(cell_.arm.upper_arm_m, 0, 0) *
+         AngleAxisd(joints[kJ2], Vector3d::UnitZ()) * Translation3d(cell_.arm.forearm_m, 0, joints[kJ3]) *
+         AngleAxisd(joints[kJ4], Vector3d::UnitZ());
+}
+
+Eigen::Isometry3d CheckCell::X_WO(const Joints& joints) const {
+  using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
   const double top_m = cell_.table.plate_height_m + cell_.fixture.post_height_m;
-  const Eigen::Isometry3d X_WO = Translation3d(cell_.table.tilt_axis_W) *
-                                 AngleAxisd(joints[kTilt], -Vector3d::UnitY()) * Translation3d(0, 0, top_m) *
-                                 AngleAxisd(joints[kRotation], Vector3d::UnitZ());
-  return X_WO.inverse() * X_WF;
+  return Translation3d(cell_.table.tilt_axis_W) * AngleAxisd(joints[kTilt], -Vector3d::UnitY()) *
+         Translation3d(0, 0, top_m) * AngleAxisd(joints[kRotation], Vector3d::UnitZ());
+}
+
+Eigen::Isometry3d CheckCell::X_OF(const Joints& joints) const {
+  return X_WO(joints).inverse() * X_WF(joints);
 }
 
 /// How far before the focus the first surface is that a ray from the lens, `aside_O` of the beam, meets; nothing if it
@@ -128,24 +132,19 @@ bool CheckCell::is_in_table(const Eigen::Vector3d& p_O) const {
   return r < (p_O.z() > -post ? cell_.fixture.post_radius_m : cell_.table.plate_radius_m);
 }
 
-/// A packet of rays along the body: those of its mantle and its axis.
-bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OF) const {
+bool CheckCell::is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O,
+                               const std::array<Eigen::Vector3d, 16>& along_O, double length_m) const {
   alignas(64) RTCRay16 rays{};
   alignas(64) int valid[kBundleRays];
-  const Eigen::Vector3d u = body.axis_F.unitOrthogonal(), v = body.axis_F.cross(u);
-  const Eigen::Vector3f along = (X_OF.linear() * body.axis_F).cast<float>();
-  for (int i = 0; i < kBundleRays; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kRimRays;
-    Eigen::Vector3d from_F = body.from_F;
-    if (i < kRimRays) from_F += body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
-    const Eigen::Vector3f from = (X_OF * from_F).cast<float>();
+  for (std::size_t i = 0; i < kBundleRays; ++i) {
+    const Eigen::Vector3f from = from_O[i].cast<float>(), along = along_O[i].cast<float>();
     rays.org_x[i] = from.x();
     rays.org_y[i] = from.y();
     rays.org_z[i] = from.z();
     rays.dir_x[i] = along.x();
     rays.dir_y[i] = along.y();
     rays.dir_z[i] = along.z();
-    rays.tfar[i] = static_cast<float>(body.length_m);
+    rays.tfar[i] = static_cast<float>(length_m);
     rays.mask[i] = ~0u;
     valid[i] = -1;
   }
@@ -154,6 +153,20 @@ bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcOccluded16(valid, rays_->scene, &context, &rays);
   return std::any_of(std::begin(rays.tfar), std::end(rays.tfar), [](float t) { return t < 0; });
+}
+
+/// A packet of rays along the body: those of its mantle and its axis.
+bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const {
+  const Eigen::Vector3d u = body.axis_F.unitOrthogonal(), v = body.axis_F.cross(u);
+  std::array<Eigen::Vector3d, kBundleRays> from_O, along_O;
+  along_O.fill(X_OB.linear() * body.axis_F);
+  for (std::size_t i = 0; i < kBundleRays; ++i) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(i) / kRimRays;
+    Eigen::Vector3d from_F = body.from_F;
+    if (i < kRimRays) from_F += body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
+    from_O[i] = X_OB * from_F;
+  }
+  return is_any_blocked(from_O, along_O, body.length_m);
 }
 
 /// The body's mantle against plate and post, and the plate's rim and the post's axis against the body.
@@ -183,16 +196,65 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
   return false;
 }
 
+std::string CheckCell::body_fault(const Cylinder& body, const char* name, const Eigen::Isometry3d& X_OB) const {
+  // Nothing can touch if the ball around the body is clear of the ball around everything else.
+  const double ball_m = std::hypot(.5 * body.length_m, body.radius_m);
+  const Eigen::Vector3d middle_O = X_OB * (body.from_F + .5 * body.length_m * body.axis_F);
+  if (middle_O.norm() > reach_m_ + ball_m) return {};
+  if (touches_object(body, X_OB)) return std::string(name) + " touches the object";
+  if (middle_O.z() < ball_m && touches_table(body, X_OB)) return std::string(name) + " touches the table";
+  return {};
+}
+
 std::string CheckCell::body_fault(const Eigen::Isometry3d& X_OF) const {
-  for (const auto& [body, name] : {std::pair{&lens_, "the lens body"}, std::pair{&quill_, "the quill"}}) {
-    // Nothing can touch if the ball around the body is clear of the ball around everything else.
-    const Eigen::Vector3d middle_O = X_OF * (body->from_F + .5 * body->length_m * body->axis_F);
-    if (middle_O.norm() > reach_m_ + std::hypot(.5 * body->length_m, body->radius_m)) continue;
-    if (touches_object(*body, X_OF)) return std::string(name) + " touches the object";
-    if (middle_O.z() < std::hypot(.5 * body->length_m, body->radius_m) && touches_table(*body, X_OF))
-      return std::string(name) + " touches the table";
+  std::string fault = body_fault(lens_, "the lens body", X_OF);
+  return fault.empty() ? body_fault(quill_, "the quill", X_OF) : fault;
+}
+
+/// The link lies along x of its frame, whose origin is at its first joint. Its rounded ends are looked at by rays from
+/// their middles.
+std::string CheckCell::link_fault(const CellDescription::Arm::Link& link, double length_m, const char* name,
+                                  const Eigen::Isometry3d& X_WB, const Eigen::Isometry3d& X_WF,
+                                  const Eigen::Isometry3d& X_OW) const {
+  if (link.radius_m <= 0) return {};
+  const Cylinder body{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), length_m, link.radius_m};
+  const Eigen::Isometry3d X_OB = X_OW * X_WB;
+  if (std::string fault = body_fault(body, name, X_OB); !fault.empty()) return fault;
+  for (const double end_m : {0., length_m}) {
+    const Eigen::Vector3d middle_O = X_OB * Eigen::Vector3d(end_m, 0, 0);
+    if (middle_O.norm() > reach_m_ + link.radius_m) continue;
+    std::array<Eigen::Vector3d, kBundleRays> from_O, along_O;
+    from_O.fill(middle_O);
+    for (std::size_t i = 0; i < kBundleRays; ++i) {  // evenly over the ball, by the golden angle
+      const double z = 1 - (2 * static_cast<double>(i) + 1) / kBundleRays, turn = 2.399963 * static_cast<double>(i);
+      const double r = std::sqrt(1 - z * z);
+      along_O[i] = {r * std::cos(turn), r * std::sin(turn), z};
+    }
+    if (is_any_blocked(from_O, along_O, link.radius_m)) return std::string(name) + " touches the object";
+  }
+  const Eigen::Isometry3d X_BF = X_WB.inverse() * X_WF;
+  constexpr int kLensPoints = 20;
+  for (int i = 0; i <= kLensPoints; ++i) {
+    const Eigen::Vector3d p_B = X_BF * (lens_.from_F + (lens_.length_m * i / kLensPoints) * lens_.axis_F);
+    const Eigen::Vector3d nearest_B(std::clamp(p_B.x(), 0., length_m), 0, 0);
+    if ((p_B - nearest_B).norm() < link.radius_m + lens_.radius_m) return std::string(name) + " touches the lens body";
   }
   return {};
+}
+
+std::string CheckCell::body_fault(const Joints& joints) const {
+  using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
+  const Eigen::Isometry3d X_WF_now = X_WF(joints), X_OW = X_WO(joints).inverse();
+  if (std::string fault = body_fault(X_OW * X_WF_now); !fault.empty()) return fault;
+  const auto& arm = cell_.arm;
+  const Eigen::Isometry3d upper =
+      Translation3d(0, 0, arm.upper_link.height_m) * AngleAxisd(joints[kJ1], Vector3d::UnitZ());
+  const Eigen::Isometry3d fore = AngleAxisd(joints[kJ1], Vector3d::UnitZ()) * Translation3d(arm.upper_arm_m, 0, 0) *
+                                 AngleAxisd(joints[kJ2], Vector3d::UnitZ()) *
+                                 Translation3d(0, 0, arm.fore_link.height_m);
+  std::string fault = link_fault(arm.fore_link, arm.forearm_m, "the forearm", fore, X_WF_now, X_OW);
+  if (!fault.empty()) return fault;
+  return link_fault(arm.upper_link, arm.upper_arm_m, "the upper arm", upper, X_WF_now, X_OW);
 }
 
 double CheckCell::travel_m(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const {

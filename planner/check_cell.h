@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -28,20 +29,31 @@ class CheckCell {
   std::string beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const;
   /// What lens body or quill run into; empty if nothing.
   std::string body_fault(const Eigen::Isometry3d& X_OF) const;
+  /// ... or upper arm or forearm.
+  std::string body_fault(const Joints& joints) const;
   /// How far the ends of the lens travel in O between two poses.
   double travel_m(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;
 
  private:
   struct Rays;
-  /// A solid cylinder in the frame F: axis from `from_F` along `axis_F`.
+  /// A solid cylinder in its frame: axis from `from_F` along `axis_F`.
   struct Cylinder {
     Eigen::Vector3d from_F, axis_F;
     double length_m, radius_m;
   };
   std::optional<double> lands_short_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
                                       const Eigen::Vector3d& aside_O, double beyond_m) const;
-  bool touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OF) const;
-  bool touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OF) const;
+  /// `body` in a frame B at X_OB.
+  std::string body_fault(const Cylinder& body, const char* name, const Eigen::Isometry3d& X_OB) const;
+  std::string link_fault(const CellDescription::Arm::Link& link, double length_m, const char* name,
+                         const Eigen::Isometry3d& X_WB, const Eigen::Isometry3d& X_WF,
+                         const Eigen::Isometry3d& X_OW) const;
+  bool touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const;
+  bool touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OB) const;
+  bool is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O, const std::array<Eigen::Vector3d, 16>& along_O,
+                      double length_m) const;
+  Eigen::Isometry3d X_WF(const Joints& joints) const;
+  Eigen::Isometry3d X_WO(const Joints& joints) const;
   bool is_in_table(const Eigen::Vector3d& p_O) const;
 
   CellDescription cell_;

@@ -89,4 +89,32 @@ bool ObjectRays::is_blocked(const Eigen::Vector3d& from_O, const Eigen::Vector3d
   return ray.tfar < 0;
 }
 
+bool ObjectRays::is_beam_blocked(const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O,
+                                 const std::array<Eigen::Vector3d, 3>& aside_O, double near_m, double side_near_m,
+                                 double far_m) const {
+  alignas(16) RTCRay4 rays;
+  alignas(16) const int valid[4] = {-1, -1, -1, -1};
+  const Eigen::Vector3f direction = direction_O.cast<float>();
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector3f from = (i == 0 ? from_O : Eigen::Vector3d(from_O + aside_O[i - 1])).cast<float>();
+    rays.org_x[i] = from.x();
+    rays.org_y[i] = from.y();
+    rays.org_z[i] = from.z();
+    rays.dir_x[i] = direction.x();
+    rays.dir_y[i] = direction.y();
+    rays.dir_z[i] = direction.z();
+    rays.tnear[i] = static_cast<float>(i == 0 ? near_m : side_near_m);
+    rays.tfar[i] = static_cast<float>(far_m);
+    rays.time[i] = 0;
+    rays.mask[i] = std::numeric_limits<unsigned>::max();
+    rays.id[i] = 0;
+    rays.flags[i] = 0;
+  }
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded4(valid, scene_->scene, &context, &rays);
+  return std::any_of(std::begin(rays.tfar), std::end(rays.tfar), [](float t) { return t < 0; });
+}
+
 }  // namespace hilbrush

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 
 #include "sampling/textured_mesh.h"
@@ -19,6 +20,10 @@ class ObjectRays {
                        double far_m) const;
   /// Whether any surface lies between; faster than the length.
   bool is_blocked(const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O, double near_m, double far_m) const;
+  /// The same of a ray from `from_O` and of three beside it, which begin at `side_near_m`; one packet of four.
+  bool is_beam_blocked(const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O,
+                       const std::array<Eigen::Vector3d, 3>& aside_O, double near_m, double side_near_m,
+                       double far_m) const;
 
  private:
   struct Scene;

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "planner/exposure_program.h"
@@ -23,15 +24,21 @@ enum class SkipReason : std::uint8_t {
   kJointLimit,  ///< the poses that would do exceed a joint's limits
   kLensObject,  ///< the lens body or quill would touch the object
   kLensTable,   ///< ... or the table plate, post
-  kEnergy       ///< the laser cannot deliver the dot's energy
+  kEnergy,      ///< the laser cannot deliver the dot's energy
+  kArm,         ///< a link of the arm would touch the object, the table or the lens
+  kNoWay        ///< there are poses, but no clear way to one
 };
-const char* skip_reason_name(
-    SkipReason reason);  ///< "occluded", "incidence", "joint_limit", "lens_object", "lens_table", "energy"
+inline constexpr int kSkipReasonCount = 8;
+/// "occluded", "incidence", "joint_limit", "lens_object", "lens_table", "energy", "arm", "no_way"
+const char* skip_reason_name(SkipReason reason);
 
 struct SkippedDot {
   std::uint32_t dot_index = 0;
   SkipReason reason = SkipReason::kOccluded;
-  std::string detail;  ///< a sentence with the amount, where there is one
+  std::string detail;          ///< a sentence with the amount, where there is one
+  std::string_view what = {};  ///< the same without the amount, so that dots can be counted by it; of static storage
+  double amount = 0;      ///< what the sentence says: past a limit, too near, or blocked so far from the dot; rad or m
+  bool is_angle = false;  ///< the amount is in rad
 };
 
 /// Clearance and reach on one object in one cell. Thread-safe after construction.

@@ -196,7 +196,7 @@ void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
   const Eigen::Isometry3d X_OF = check_cell_.X_OF(joints);
   check_dot(i, X_OF, faults);
   if (auto fault = check_cell_.beam_fault(X_OF, kLandingToleranceM); !fault.empty()) faults.push_back({fault, i});
-  if (auto fault = check_cell_.body_fault(X_OF); !fault.empty()) faults.push_back({fault, i});
+  if (auto fault = check_cell_.body_fault(joints); !fault.empty()) faults.push_back({fault, i});
 }
 
 /// What may only happen with the tool drawn back: the elbow going over, half a turn of J4 or C at once.
@@ -227,7 +227,7 @@ void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i
       now[axis] = from[axis] + std::copysign(axis_position(std::abs(to[axis] - from[axis]), end_s * k / look_count,
                                                            cell_.axes[axis]),
                                              to[axis] - from[axis]);
-    const std::string fault = check_cell_.body_fault(check_cell_.X_OF(now));
+    const std::string fault = check_cell_.body_fault(now);
     if (fault.empty()) continue;
     faults.push_back({"on the way there " + fault, i});
     return;

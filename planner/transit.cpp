@@ -67,20 +67,20 @@ double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
   double left = 0, right = 0;
   for (const std::size_t axis : {kJ1, kJ2, kJ4}) (b[axis] > a[axis] ? left : right) += std::abs(b[axis] - a[axis]);
   const double yaw_change = std::max(left, right);
-  return moved(kJ1) * flange_m + moved(kJ2) * l2 + yaw_change * tool_m + moved(kJ3) +
-         moved(kTilt) * reach_.object_radius_m + moved(kRotation) * reach_.object_turn_m;
+  // With the arm folded the elbow is the farthest point of the links.
+  return moved(kJ1) * std::max(flange_m, l1) + moved(kJ2) * l2 + yaw_change * tool_m + moved(kJ3) +
+         moved(kTilt) * reach_.clearance.radius_around_tilt_m() +
+         moved(kRotation) * reach_.clearance.radius_around_rotation_m();
 }
 
 double Transit::least_slack_m(const Joints& from) const {
-  const double slack_m = reach_.clearance.slack_m(reach_.kinematics.tool_pose(from));
+  const double slack_m = reach_.clearance.slack_m(reach_.kinematics, from);
   return std::clamp(.5 * slack_m, kLeastSlackOfEscapeM, kLeastSlackM);
 }
 
 bool Transit::is_clear(const Joints& from, const Joints& to) const {
   const double least_m = least_slack_m(from);
-  const auto slack_at = [&](const Joints& joints) {
-    return reach_.clearance.slack_m(reach_.kinematics.tool_pose(joints));
-  };
+  const auto slack_at = [&](const Joints& joints) { return reach_.clearance.slack_m(reach_.kinematics, joints); };
   double slack_m = slack_at(from);
   if (travel_bound_m(from, to) <= slack_m) return true;
   if (slack_at(to) < kLeastSlackM) return false;
