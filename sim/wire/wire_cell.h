@@ -1,0 +1,57 @@
+#pragma once
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "sim/wire/endpoints.h"
+#include "sim/wire/fault_script.h"
+#include "sim/wire/time_record.h"
+#include "sim/wire/true_cell.h"
+
+/// The simulated cell on wires: device servers on TCP ports of this machine (chosen by the system) and
+/// pseudo-terminals, all in front of one TrueCell, on a clock that runs at a scale. A thread of its own serves them
+/// from construction to destruction. Its public functions may be called from any thread.
+namespace hilbrush {
+
+struct WireOptions {
+  enum class Table { kOrientalAz, kCia402, kLeadshinePr };
+  enum class LaserHead { kObis, kCobolt };
+  Table table = Table::kOrientalAz;
+  bool is_table_serial = false;  ///< Modbus RTU on a pseudo-terminal instead of TCP
+  LaserHead laser = LaserHead::kObis;
+  bool is_laser_serial = false;                ///< a pseudo-terminal instead of a TCP port
+  double time_scale = 1;                       ///< wall seconds of one cell second, > 0
+  double steps_per_deg = 2777.77777777777777;  ///< a motor of 10,000 steps a turn behind a gear of 100
+  double start_delay_s = 5, warm_up_s = 0;
+  FaultScript faults;
+};
+
+class WireCell {
+ public:
+  /// @throws std::system_error if there is no port or pseudo-terminal to be had.
+  WireCell(const CellDescription& description, const WireOptions& options);
+  /// Light that is on ends and is recorded.
+  ~WireCell();
+  WireCell(const WireCell&) = delete;
+  WireCell& operator=(const WireCell&) = delete;
+
+  const WireEndpoints& endpoints() const;
+  double now_s() const;
+  /// Called on the serving thread (or that of act()), which waits for it.
+  void set_emission_sink(EmissionSink sink);
+  /// Acts on the cell at its present time: an operator at the key switch, a hand in the interlock, a look at the axes.
+  void act(const std::function<void(TrueCell&)>& action);
+  void add_fault(const WireFault& fault);
+  /// Ends all faults, also those that have not begun.
+  void clear_faults();
+  std::uint64_t faults_begun() const;
+  std::uint64_t message_count(WireDevice device) const;
+  /// Whose time the dots took, so far.
+  std::vector<TimeRecord::Dot> dot_times() const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace hilbrush
