@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdlib>
 
 namespace hilbrush {
 
@@ -84,6 +86,13 @@ void Canvas::set(int x, int y, Color color) {
 void Canvas::mark(int x, int y, int radius, Color color) {
   for (int dy = -radius; dy <= radius; ++dy)
     for (int dx = -radius; dx <= radius; ++dx) set(x + dx, y + dy, color);
+}
+
+void Canvas::line(int x0, int y0, int x1, int y1, Color color) {
+  const int steps = std::max({std::abs(x1 - x0), std::abs(y1 - y0), 1});
+  for (int i = 0; i <= steps; ++i)
+    set(x0 + static_cast<int>(std::lround(static_cast<double>(i) * (x1 - x0) / steps)),
+        y0 + static_cast<int>(std::lround(static_cast<double>(i) * (y1 - y0) / steps)), color);
 }
 
 void Canvas::write(int x, int y, std::string_view text, int scale, Color color) {

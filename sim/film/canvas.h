@@ -17,6 +17,8 @@ class Canvas {
   void set(int x, int y, Color color);
   /// A filled square of side 2 * radius + 1 around (x, y).
   void mark(int x, int y, int radius, Color color);
+  /// A straight line, one pixel wide, ends included.
+  void line(int x0, int y0, int x1, int y1, Color color);
   /// Capitals, digits and common signs in a 5 x 7 raster, enlarged `scale` times, top left corner at (x, y); anything
   /// else is left blank.
   void write(int x, int y, std::string_view text, int scale, Color color);
