@@ -1,0 +1,166 @@
+// Painting time, incidence and planning cost of the baselines and of every way of planning, on the same dots' counts,
+// by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program passes the same check.
+//   plan_bench MODEL SIZE_MM DOTS [ROW...]      rows: laminar curve thesis fast balanced quality; all unless named
+//   plan_bench --trade MODEL SIZE_MM DOTS       painting time over incidence, by preferred incidence and planning
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "config/cell_file.h"
+#include "config/job_settings.h"
+#include "planner/plan.h"
+#include "planner/program_check.h"
+#include "sampling/images/image_file.h"
+#include "sampling/laminar.h"
+#include "sampling/mesh_repair.h"
+#include "sampling/model_file.h"
+#include "sampling/placement.h"
+#include "sampling/sample.h"
+#include "tests/bench/answer_hash.h"
+#include "tests/bench/process_usage.h"
+
+namespace {
+
+using namespace hilbrush;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+struct Row {
+  const char* name;
+  Sampler sampler;
+  CurveKind curve;
+  PlanOptions options;
+};
+
+const std::vector<Row>& rows() {
+  static const PlanOptions follow{.policy = PosePolicy::kFollowNormal};
+  static const std::vector<Row> all{
+      {"laminar", Sampler::kCentroid, CurveKind::kLaminar, follow},
+      {"curve", Sampler::kCentroid, CurveKind::kHilbert, follow},
+      {"thesis", Sampler::kJittered, CurveKind::kHilbert, follow},
+      {"fast", Sampler::kCentroid, CurveKind::kHilbert, {.planning = Planning::kFast}},
+      {"balanced", Sampler::kCentroid, CurveKind::kHilbert, {.planning = Planning::kBalanced}},
+      {"quality", Sampler::kCentroid, CurveKind::kHilbert, {.planning = Planning::kQuality}},
+  };
+  return all;
+}
+
+struct Bench {
+  Bench(const std::string& model, double size_mm)
+      : cell(load_cell(find_cell("default"))), mesh(placed(model, size_mm)), curve(mesh) {}
+
+  static TexturedMesh placed(const std::string& model, double size_mm) {
+    PlacementOptions placement;
+    placement.size_m = size_mm * 1e-3;
+    return repair_mesh(place_on_table(load_model(model, load_image_file), placement)).mesh;
+  }
+  DotSequence dots(const Row& row, std::uint64_t count) const {
+    const ToneField tone(mesh, tone_options(cell, sampler_name(row.sampler)));
+    SampleOptions options;
+    options.dot_count = count;
+    options.sampler = row.sampler;
+    return row.curve == CurveKind::kLaminar ? place_laminar(mesh, tone, options) : place_dots(curve, tone, options);
+  }
+  void run(const Row& row, std::uint64_t count) const;
+
+  CellDescription cell;
+  TexturedMesh mesh;
+  SurfaceCurve curve;
+};
+
+struct Incidence {
+  double mean = 0, p95 = 0, max = 0;
+};
+
+Incidence incidence_of(const ExposureProgram& program) {
+  std::vector<float> all;
+  double sum = 0;
+  for (const Exposure& exposure : program.exposures) {
+    all.push_back(exposure.incidence);
+    sum += static_cast<double>(exposure.incidence);
+  }
+  if (all.empty()) return {};
+  std::sort(all.begin(), all.end());
+  return {sum / static_cast<double>(all.size()) / kDegree,
+          static_cast<double>(all[(all.size() - 1) * 95 / 100]) / kDegree, static_cast<double>(all.back()) / kDegree};
+}
+
+void Bench::run(const Row& row, std::uint64_t count) const {
+  const DotSequence dot_sequence = dots(row, count);
+  const Reach reach(mesh, cell, row.options);
+  const auto begin = std::chrono::steady_clock::now();
+  const double begin_cpu_s = cpu_s();
+  const Plan plan = plan_exposures(reach, dot_sequence);
+  const double plan_cpu_s = cpu_s() - begin_cpu_s;
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const auto faults = check_program(plan.program, plan.skipped, dot_sequence, mesh, cell, row.options);
+  AnswerHash hash;
+  std::size_t table_moves = 0;
+  for (std::size_t i = 0; i < plan.program.exposures.size(); ++i) {
+    const Joints& joints = plan.program.exposures[i].joints;
+    for (const double joint : joints) hash.take(joint);
+    if (i == 0) continue;
+    const Joints& before = plan.program.exposures[i - 1].joints;
+    if (joints[kTilt] != before[kTilt] || joints[kRotation] != before[kRotation]) ++table_moves;
+  }
+  const Incidence incidence = incidence_of(plan.program);
+  std::printf(
+      "%-9s %8zu %7zu %9.0f %6.2f | %6.0f %6.0f %6.0f %6.0f | %5.1f %5.1f %5.1f | %6zu %6zu | %7.2f %7.2f %6.0f %4zu "
+      "%016llx\n",
+      row.name, dot_sequence.dots.size(), plan.skipped.size(), plan.time.total_s(),
+      1e3 * plan.time.total_s() / static_cast<double>(std::max<std::size_t>(1, plan.program.exposures.size())),
+      plan.time.move_s, plan.time.settle_s, plan.time.expose_s, plan.time.retract_s, incidence.mean, incidence.p95,
+      incidence.max, table_moves, plan.program.vias.size(), plan_cpu_s, wall_s, peak_mb(), faults.size(), hash.value());
+  for (std::size_t i = 0; i < std::min<std::size_t>(faults.size(), 3); ++i)
+    std::printf("  fault at %zu: %s\n", faults[i].exposure, faults[i].what.c_str());
+  std::fflush(stdout);
+}
+
+void print_heads() {
+  std::printf("%-9s %8s %7s %9s %6s | %6s %6s %6s %6s | %5s %5s %5s | %6s %6s | %7s %7s %6s %4s %s\n", "row", "dots",
+              "skipped", "painting", "ms/dot", "move", "settle", "expose", "retrct", "mean", "p95", "max", "table",
+              "vias", "CPU s", "wall s", "MB", "bad", "answer");
+}
+
+void trade(const Bench& bench, std::uint64_t count) {
+  for (const double preferred_deg : {5., 10., 15., 20., 25., 30.})
+    for (Row row : rows()) {
+      if (row.options.policy == PosePolicy::kFollowNormal) continue;
+      row.options.preferred_incidence = preferred_deg * kDegree;
+      std::printf("%2.0f ", preferred_deg);
+      bench.run(row, count);
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  const bool is_trade = !arguments.empty() && arguments[0] == "--trade";
+  if (is_trade) arguments.erase(arguments.begin());
+  if (arguments.size() < 3) {
+    std::fprintf(stderr, "usage: plan_bench [--trade] MODEL SIZE_MM DOTS [ROW...]\n");
+    return 2;
+  }
+  try {
+    const Bench bench(arguments[0], std::stod(arguments[1]));
+    const std::uint64_t count = std::stoull(arguments[2]);
+    const std::vector<std::string> wanted(arguments.begin() + 3, arguments.end());
+    print_heads();
+    if (is_trade) {
+      trade(bench, count);
+      return 0;
+    }
+    for (const Row& row : rows())
+      if (wanted.empty() || std::find(wanted.begin(), wanted.end(), row.name) != wanted.end()) bench.run(row, count);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "plan_bench: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
