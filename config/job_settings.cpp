@@ -46,6 +46,25 @@ void read_incidence(JsonObject& json, JobSettings& settings) {
       preferred.value_or(std::min(settings.preferred_incidence_deg, settings.max_incidence_deg));
 }
 
+/// How this job's object is held.
+void read_mounting(JsonObject& json, JobSettings& settings) {
+  if (json.has("fixture"))
+    json.object("fixture", [&](JsonObject& fixture) {
+      settings.fixture.post_height_mm = fixture.optional_number("post_height_mm", {0, 1000});
+      settings.fixture.post_radius_mm = fixture.optional_number("post_radius_mm", {0.1, 1000});
+      settings.fixture.plate_radius_mm = fixture.optional_number("plate_radius_mm", {0.1, 2000});
+    });
+  if (json.has("mounting"))
+    json.object("mounting", [&](JsonObject& mounting) {
+      if (mounting.has("offset_mm")) {
+        const std::vector<double> offset = mounting.numbers("offset_mm", 3, 3, {-1000, 1000});
+        if (offset[2] < 0) mounting.refuse("offset_mm", "the object would stand below the post's top");
+        std::copy(offset.begin(), offset.end(), settings.mounting.offset_mm.begin());
+      }
+      settings.mounting.turn_deg = mounting.optional_number("turn_deg", {-360, 360}).value_or(0);
+    });
+}
+
 /// How dots are placed, and what improves them afterwards.
 void read_sampling(JsonObject& json, JobSettings& settings) {
   if (const auto choice = json.optional_choice("sampler", kSamplerNames))
@@ -80,6 +99,7 @@ JobSettings read_settings(JsonObject& json) {
     settings.untextured = static_cast<Untextured>(*choice);
   read_sampling(json, settings);
   read_incidence(json, settings);
+  read_mounting(json, settings);
   settings.cell = json.optional_text("cell", 4096).value_or(settings.cell);
   settings.dry_run = json.optional_boolean("dry_run").value_or(settings.dry_run);
   return settings;
@@ -102,25 +122,31 @@ JobSettings job_settings_from_json(const std::string& text, const std::string& o
 std::string job_settings_to_json(const JobSettings& settings) {
   // What stands in for an unset dpi is written out, so that equal jobs have equal text.
   const std::optional<double> dpi = settings.dpi || settings.dots ? settings.dpi : std::optional<double>(kDefaultDpi);
-  const nlohmann::ordered_json json{{"dpi", or_null(dpi)},
-                                    {"dots", or_null(settings.dots)},
-                                    {"size_mm", or_null(settings.size_mm)},
-                                    {"units_mm", or_null(settings.units_mm)},
-                                    {"up", or_null(settings.up)},
-                                    {"untextured", untextured_name(settings.untextured)},
-                                    {"sampler", sampler_name(settings.sampler)},
-                                    {"curve", curve_name(settings.curve)},
-                                    {"density", density_name(settings.density)},
-                                    {"seed", settings.seed},
-                                    {"levels", settings.levels},
-                                    {"predictive_rounds", settings.predictive_rounds},
-                                    {"largest_gap_pitches", or_null(settings.largest_gap_pitches)},
-                                    {"fine_passes", settings.fine_passes},
-                                    {"tone_curve", tone_mapping_name(settings.tone_curve)},
-                                    {"max_incidence_deg", settings.max_incidence_deg},
-                                    {"preferred_incidence_deg", settings.preferred_incidence_deg},
-                                    {"cell", settings.cell},
-                                    {"dry_run", settings.dry_run}};
+  const nlohmann::ordered_json json{
+      {"dpi", or_null(dpi)},
+      {"dots", or_null(settings.dots)},
+      {"size_mm", or_null(settings.size_mm)},
+      {"units_mm", or_null(settings.units_mm)},
+      {"up", or_null(settings.up)},
+      {"untextured", untextured_name(settings.untextured)},
+      {"sampler", sampler_name(settings.sampler)},
+      {"curve", curve_name(settings.curve)},
+      {"density", density_name(settings.density)},
+      {"seed", settings.seed},
+      {"levels", settings.levels},
+      {"predictive_rounds", settings.predictive_rounds},
+      {"largest_gap_pitches", or_null(settings.largest_gap_pitches)},
+      {"fine_passes", settings.fine_passes},
+      {"tone_curve", tone_mapping_name(settings.tone_curve)},
+      {"max_incidence_deg", settings.max_incidence_deg},
+      {"preferred_incidence_deg", settings.preferred_incidence_deg},
+      {"fixture",
+       {{"post_height_mm", or_null(settings.fixture.post_height_mm)},
+        {"post_radius_mm", or_null(settings.fixture.post_radius_mm)},
+        {"plate_radius_mm", or_null(settings.fixture.plate_radius_mm)}}},
+      {"mounting", {{"offset_mm", settings.mounting.offset_mm}, {"turn_deg", settings.mounting.turn_deg}}},
+      {"cell", settings.cell},
+      {"dry_run", settings.dry_run}};
   return json.dump();
 }
 
@@ -157,6 +183,18 @@ SampleOptions sample_options(const JobSettings& settings) {
 PlanOptions plan_options(const JobSettings& settings) {
   return {.max_incidence = settings.max_incidence_deg * kDegree,
           .preferred_incidence = settings.preferred_incidence_deg * kDegree};
+}
+
+MountingOptions mounting_options(const JobSettings& settings) {
+  const auto metres = [](const std::optional<double>& length_mm) {
+    return length_mm ? std::optional<double>(*length_mm * 1e-3) : std::nullopt;
+  };
+  const auto& offset_mm = settings.mounting.offset_mm;
+  return {.post_height_m = metres(settings.fixture.post_height_mm),
+          .post_radius_m = metres(settings.fixture.post_radius_mm),
+          .plate_radius_m = metres(settings.fixture.plate_radius_mm),
+          .offset_m = {offset_mm[0] * 1e-3, offset_mm[1] * 1e-3, offset_mm[2] * 1e-3},
+          .turn = settings.mounting.turn_deg * kDegree};
 }
 
 }  // namespace hilbrush

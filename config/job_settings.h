@@ -1,8 +1,10 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 
+#include "planner/mounting_options.h"
 #include "planner/plan_options.h"
 #include "sampling/sample_options.h"
 #include "sampling/tone.h"
@@ -15,6 +17,17 @@ namespace hilbrush {
 enum class ToneMapping {
   kCalibrated,  ///< by the cell's tone curve
   kLinear       ///< asked = wanted times the cell's asked_max: for a wedge that a curve is to be made from
+};
+
+/// The post and plate that hold this job's object; what is unset is the cell's.
+struct FixtureSettings {
+  std::optional<double> post_height_mm, post_radius_mm, plate_radius_mm;
+};
+
+/// Where the object sits: turned about the post's axis, then shifted from the middle of the post's top.
+struct MountingSettings {
+  std::array<double, 3> offset_mm{};
+  double turn_deg = 0;
 };
 
 struct JobSettings {
@@ -35,6 +48,8 @@ struct JobSettings {
   ToneMapping tone_curve = ToneMapping::kCalibrated;
   double max_incidence_deg = 45;
   double preferred_incidence_deg = 20;
+  FixtureSettings fixture;
+  MountingSettings mounting;
   std::string cell = "default";  ///< name of a shipped cell, or a file
   bool dry_run = false;
 };
@@ -55,5 +70,6 @@ const char* tone_mapping_name(ToneMapping mapping);  ///< "calibrated", "linear"
 
 SampleOptions sample_options(const JobSettings& settings);
 PlanOptions plan_options(const JobSettings& settings);
+MountingOptions mounting_options(const JobSettings& settings);
 
 }  // namespace hilbrush

@@ -17,6 +17,8 @@
 #include "daemon/job_sampling.h"
 #include "daemon/painted_dots.h"
 #include "daemon/report.h"
+#include "planner/mounting.h"
+#include "planner/mounting_advice.h"
 #include "planner/plan.h"
 #include "planner/program_check.h"
 #include "planner/program_file.h"
@@ -106,16 +108,19 @@ void make_output_folder(const std::filesystem::path& folder) {
 /// never moves.
 struct Workpiece {
   Workpiece(const PipelineRequest& request, Stages& stages)
-      : cell(load_cell(request.cell_file)), settings(request.settings) {
+      : cell(with_fixture(load_cell(request.cell_file), mounting_options(request.settings))),
+        settings(request.settings) {
     Model model = stages.run("load", [&](const Progress&) { return load_model(request.model, load_image_file); });
     report.mesh.file = request.model.filename().string();
     report.mesh.warnings = model.warnings;
     report.settings_json = job_settings_to_json(settings);
     report.seed = settings.seed;
+    up = placement_options(settings).up.value_or(model.up);
     provenance = {hash_of_files(model.files), hash_of_settings(settings), cell.sha256, HILBRUSH_VERSION};
 
-    auto repaired = stages.run(
-        "disk", [&](const Progress&) { return repair_mesh(place_on_table(model, placement_options(settings))); });
+    auto repaired = stages.run("disk", [&](const Progress&) {
+      return repair_mesh(mounted(place_on_table(model, placement_options(settings)), mounting_options(settings)));
+    });
     mesh = with_curvature_density(std::move(repaired.mesh), settings.density);
     report.mesh.repairs = std::move(repaired.repairs);
     report.mesh.vertices = mesh.vertices.size();
@@ -133,6 +138,7 @@ struct Workpiece {
   JobSettings settings;
   Provenance provenance;
   TexturedMesh mesh;
+  UpAxis up = UpAxis::kZ;
   ToneOptions tone_options;
   std::optional<ToneField> tone;
   Report report;
@@ -145,8 +151,7 @@ struct PlannedWork {
 
 std::vector<std::string> skip_reason_names() {
   std::vector<std::string> names{"exposed"};
-  for (int r = 0; r < kSkipReasonCount; ++r)
-    names.emplace_back(skip_reason_name(static_cast<SkipReason>(r)));
+  for (int r = 0; r < kSkipReasonCount; ++r) names.emplace_back(skip_reason_name(static_cast<SkipReason>(r)));
   return names;
 }
 
@@ -202,6 +207,9 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   report.dots.requested = piece.settings.dots.value_or(report.dots.placed);
   report.dots.remaining = work.plan.program.exposures.size();
   for (const auto& skipped : work.plan.skipped) ++report.dots.skipped[skip_reason_name(skipped.reason)];
+  report.skipped = skipped_figures(work.plan.skipped);
+  report.advice = advise_mounting(piece.mesh, piece.cell, {mounting_options(piece.settings), piece.up},
+                                  plan_options(piece.settings), work.dots, work.plan.skipped, piece.settings.seed);
   report.incidence = incidence_figures(work.plan.program);
   report.time = work.plan.time;
 

@@ -96,6 +96,28 @@ Json dots_json(const DotCounts& dots) {
           {"in_doubt", dots.in_doubt},   {"remaining", dots.remaining}, {"skipped", dots.skipped}};
 }
 
+Json skipped_json(const std::vector<SkippedFigures>& skipped) {
+  Json list = Json::array();
+  for (const auto& figures : skipped) {
+    Json entry{{"reason", figures.reason}, {"what", figures.what}, {"count", figures.count}};
+    if (!figures.unit.empty()) {
+      entry["typical_" + figures.unit] = figure(figures.typical);
+      entry["worst_" + figures.unit] = figure(figures.worst);
+    }
+    entry["text"] = figures.text;
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+Json advice_json(const MountingAdvice& advice) {
+  return {{"post_height_mm", advice.post_height_m ? Json(figure(*advice.post_height_m * 1e3)) : Json(nullptr)},
+          {"up", advice.up ? Json(*advice.up == UpAxis::kY ? "y" : "z") : Json(nullptr)},
+          {"reached_now", figure(advice.reached_now)},
+          {"reached_then", figure(advice.reached_then)},
+          {"text", advice_sentence(advice)}};
+}
+
 Json predictive_json(const PredictiveReport& predictive) {
   Json errors = Json::array();
   for (const double error : predictive.error_rms) errors.push_back(figure(error));
@@ -132,6 +154,8 @@ std::string report_to_json(const Report& report) {
   Json json;
   json["mesh"] = mesh_json(report.mesh);
   json["dots"] = dots_json(report.dots);
+  json["skipped"] = skipped_json(report.skipped);
+  json["suggestion"] = report.advice ? advice_json(*report.advice) : Json(nullptr);
   json["pitch_mm"] = figure(report.pitch_m * 1e3);
   json["incidence_deg"] = {{"mean", figure(report.incidence.mean_deg)},
                            {"p95", figure(report.incidence.p95_deg)},

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/skipped_figures.h"
+#include "planner/mounting_advice.h"
 #include "planner/plan.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/place_picture.h"
@@ -44,6 +46,8 @@ struct Report {
     std::vector<std::string> warnings;
   } mesh;
   DotCounts dots;
+  std::vector<SkippedFigures> skipped;  ///< why, with amounts
+  std::optional<MountingAdvice> advice;
   double pitch_m = 0;
   IncidenceFigures incidence;
   TimeSplit time;

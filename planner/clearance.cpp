@@ -20,7 +20,7 @@ constexpr double kBeamTableGapM = .3e-3;
 double cylinder_distance_m(double r, double z, double radius, double z_low, double z_high) {
   const double dr = r - radius, dz = std::max(z_low - z, z - z_high);
   if (dr <= 0 || dz <= 0) return std::max(dr, dz);
-  return std::hypot(dr, dz);
+  return std::sqrt(dr * dr + dz * dz);
 }
 
 /// Radius of object and table parts around an axis through the origin; `height` lifts O's origin above it.
@@ -44,7 +44,7 @@ bool links_come_near(const CellDescription& cell, double radius_around_tilt_m, d
 
 bool links_come_near_lens(const CellDescription& cell, double slack_m) {
   const auto& arm = cell.arm;
-  const double top_m = cell.axes[kJ3].max + slack_m + cell.lens.radius_m +
+  const double top_m = cell.axes[kJ3].max + slack_m + cell.lens.radius_m * std::cos(arm.beam_depression) +
                        std::max(0., (cell.lens.far_m - arm.flange_to_focus_m) * std::sin(arm.beam_depression));
   const auto is_near = [&](const CellDescription::Arm::Link& link) {
     return link.radius_m > 0 && link.height_m - link.radius_m < top_m;
@@ -113,7 +113,7 @@ Clearance::BallRow Clearance::cover(const Eigen::Vector3d& from_O, const Eigen::
   const int count = std::max(1, static_cast<int>(std::ceil(length_m / (2 * half_step_m))));
   const double slice_m = length_m / count;
   return {from_O + .5 * slice_m * along_O,    slice_m * along_O, count,
-          std::hypot(radius_m, .5 * slice_m), slice_m,           radius_m};
+          std::sqrt(radius_m * radius_m + .25 * slice_m * slice_m), slice_m,           radius_m};
 }
 
 Clearance::BallRow Clearance::lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,

@@ -148,11 +148,16 @@ std::optional<DotPose> Reach::Implementation::search_cone(const Target& target, 
   return std::nullopt;
 }
 
-std::optional<DotPose> Reach::Implementation::find_pose(const Target& target, const Joints& reference,
-                                                        SkippedDot* skipped) const {
+std::optional<DotPose> Reach::Implementation::find_pose_quickly(const Target& target, const Joints& reference) const {
   auto pose = search_cone(target, target.smooth_normal_O, cone_, tilts_, reference, nullptr);
   if (!pose && target.smooth_normal_O.dot(target.face_normal_O) < .999)
     pose = search_cone(target, target.face_normal_O, cone_, tilts_, reference, nullptr);
+  return pose;
+}
+
+std::optional<DotPose> Reach::Implementation::find_pose(const Target& target, const Joints& reference,
+                                                        SkippedDot* skipped) const {
+  auto pose = find_pose_quickly(target, reference);
   if (!pose) {
     // Why not, is asked while looking more closely. A third look is for windows that are narrower still: it follows
     // unless everything in sight is near and blocks the beam.

@@ -34,6 +34,9 @@ struct Reach::Implementation {
   /// reference). If there is none, `skipped` (optional) gets reason, detail and amount.
   std::optional<DotPose> find_pose(const Target& target, const Joints& reference, SkippedDot* skipped = nullptr) const;
 
+  /// The first, coarse look alone: fast also where there is nothing to find, and sometimes blind there.
+  std::optional<DotPose> find_pose_quickly(const Target& target, const Joints& reference) const;
+
   /// The arm's part of it, on a table that is already chosen. Limits, quill and links are looked at, not the lens.
   bool arm_fits(const TablePose& table, const Eigen::Vector3d& position_O, double yaw, Elbow elbow,
                 const Joints& reference, Joints& joints, class FailureTally* tally) const;

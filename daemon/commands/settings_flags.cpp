@@ -14,10 +14,11 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
 
-/// "$.size_mm" -> "--size-mm".
+/// "$.size_mm" -> "--size-mm", "$.mounting.offset_mm[2]" -> "--offset-mm".
 std::string flag_of_path(const std::string& path) {
   if (!path.starts_with("$.")) return path;
-  std::string flag = "--" + path.substr(2);
+  const std::string key = path.substr(path.rfind('.') + 1);
+  std::string flag = "--" + key.substr(0, key.find('['));
   std::replace(flag.begin(), flag.end(), '_', '-');
   return flag;
 }
@@ -25,6 +26,14 @@ std::string flag_of_path(const std::string& path) {
 template <class T>
 void put(Json& json, const char* key, const std::optional<T>& value) {
   if (value) json[key] = *value;
+}
+
+/// One key of an object of the settings.
+template <class T>
+void put_inside(Json& json, const char* object, const char* key, const std::optional<T>& value) {
+  if (!value) return;
+  if (!json.contains(object) || json[object].is_null()) json[object] = Json::object();
+  json[object][key] = *value;
 }
 
 /// A flag and its rival of which a job has one: the flag replaces what the file says.
@@ -69,6 +78,19 @@ void SettingsFlags::add_to(CLI::App& command) {
   command
       .add_option("--preferred-incidence-deg", preferred_incidence_deg, "nearer the normal where it pays (default 20)")
       ->group(group);
+  command
+      .add_option("--post-height-mm", post_height_mm, "of the post under the object, 0 to 1000 (default: the cell's)")
+      ->group(group);
+  command.add_option("--post-radius-mm", post_radius_mm, "of the post (default: the cell's)")->group(group);
+  command.add_option("--plate-radius-mm", plate_radius_mm, "of the table's plate (default: the cell's)")->group(group);
+  command
+      .add_option("--offset-mm", offset_mm,
+                  "x,y,z of the object from the middle of the post's top (default 0,0,0: centred, standing on it)")
+      ->delimiter(',')
+      ->expected(3)
+      ->group(group);
+  command.add_option("--turn-deg", turn_deg, "the object about the post, before it is shifted (default 0)")
+      ->group(group);
   add_paint_flags_to(command);
 }
 
@@ -92,7 +114,8 @@ void SettingsFlags::add_paint_flags_to(CLI::App& command) {
 bool SettingsFlags::any() const {
   return !file.empty() || dpi || size_mm || units_mm || max_incidence_deg || preferred_incidence_deg || dots || seed ||
          up || untextured || sampler || curve || density || levels || predictive_rounds || largest_gap_pitches ||
-         fine_passes || tone_curve || cell;
+         fine_passes || tone_curve || cell || post_height_mm || post_radius_mm || plate_radius_mm || turn_deg ||
+         !offset_mm.empty();
 }
 
 std::string SettingsFlags::to_json(const std::string& base, const std::string& base_origin) const {
@@ -120,6 +143,11 @@ std::string SettingsFlags::to_json(const std::string& base, const std::string& b
   put(json, "max_incidence_deg", max_incidence_deg);
   put(json, "preferred_incidence_deg", preferred_incidence_deg);
   put(json, "cell", cell);
+  put_inside(json, "fixture", "post_height_mm", post_height_mm);
+  put_inside(json, "fixture", "post_radius_mm", post_radius_mm);
+  put_inside(json, "fixture", "plate_radius_mm", plate_radius_mm);
+  put_inside(json, "mounting", "turn_deg", turn_deg);
+  if (!offset_mm.empty()) put_inside(json, "mounting", "offset_mm", std::optional(offset_mm));
   try {
     const JobSettings settings = job_settings_from_json(json.dump());
     if (json.contains("cell") && is_path(settings.cell))

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "config/job_settings.h"
 
@@ -9,12 +10,15 @@ namespace CLI {
 class App;
 }
 
-/// The settings of a job as flags: --size-mm is the key size_mm. Flags override the file given with --settings.
+/// The settings of a job as flags: --size-mm is the key size_mm, --post-height-mm the key fixture.post_height_mm. Flags
+/// override the file given with --settings.
 namespace hilbrush {
 
 struct SettingsFlags {
   std::string file;  ///< JSON; empty: none
   std::optional<double> dpi, size_mm, units_mm, max_incidence_deg, preferred_incidence_deg, largest_gap_pitches;
+  std::optional<double> post_height_mm, post_radius_mm, plate_radius_mm, turn_deg;
+  std::vector<double> offset_mm;  ///< three, or none
   std::optional<std::uint64_t> dots, seed, levels, predictive_rounds, fine_passes;
   std::optional<std::string> up, untextured, sampler, curve, density, tone_curve, cell;
 

@@ -194,6 +194,11 @@ std::string format_report(const Json& report) {
       text += line("repaired", repairs);
   }
   if (const Json& dots = member(report, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
+  if (const Json& skipped = member(report, "skipped"); skipped.is_array())
+    for (const Json& group : skipped)
+      text += line("skipped", format_count(number_field(group, "count")) + " x " + text_field(group, "text"));
+  if (const Json& suggestion = member(report, "suggestion"); suggestion.is_object())
+    text += line("suggestion", text_field(suggestion, "text"));
   if (has_number(report, "pitch_mm")) text += line("pitch", fixed(number_field(report, "pitch_mm"), 3) + " mm");
   if (const Json& incidence = member(report, "incidence_deg"); incidence.is_object())
     text += line("incidence", "mean " + fixed(number_field(incidence, "mean"), 1) + ", 95 % below " +

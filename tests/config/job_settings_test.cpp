@@ -27,7 +27,9 @@ TEST(JobSettings, NothingGivenMeansTheDefaults) {
       job_settings_to_json(settings),
       R"({"dpi":100.0,"dots":null,"size_mm":null,"units_mm":null,"up":null,"untextured":"auto","sampler":"centroid",)"
       R"("curve":"hilbert","density":"texture","seed":1,"levels":1,"predictive_rounds":0,"largest_gap_pitches":null,)"
-      R"("fine_passes":24,"tone_curve":"calibrated","max_incidence_deg":45.0,"preferred_incidence_deg":20.0,"cell":"default","dry_run":false})");
+      R"("fine_passes":24,"tone_curve":"calibrated","max_incidence_deg":45.0,"preferred_incidence_deg":20.0,)"
+      R"("fixture":{"post_height_mm":null,"post_radius_mm":null,"plate_radius_mm":null},)"
+      R"("mounting":{"offset_mm":[0.0,0.0,0.0],"turn_deg":0.0},"cell":"default","dry_run":false})");
 }
 
 TEST(JobSettings, OrderAndFormOfWhatWasGivenDoNotChangeTheCanonicalText) {
@@ -62,6 +64,9 @@ TEST(JobSettings, RoundTripOfRandomSettings) {
     settings.seed = random();
     settings.max_incidence_deg = uniform(10, 45);
     settings.preferred_incidence_deg = uniform(0, settings.max_incidence_deg);
+    if (random() % 2) settings.fixture.post_height_mm = uniform(0, 1000);
+    if (random() % 2) settings.fixture.plate_radius_mm = uniform(1, 2000);
+    settings.mounting = {{uniform(-9, 9), uniform(-9, 9), uniform(0, 9)}, uniform(-360, 360)};
     settings.cell = random() % 2 ? "default" : "/a b/\"c\"\xc3\xa4.json";
     settings.dry_run = random() % 2;
 
@@ -128,6 +133,11 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"max_incidence_deg":46})", "$.max_incidence_deg: expected a number from 1 to 45, found 46"},
       {R"({"max_incidence_deg":30,"preferred_incidence_deg":31})",
        "$.preferred_incidence_deg: above max_incidence_deg"},
+      {R"({"fixture":{"post_height_mm":-1}})", "$.fixture.post_height_mm: expected a number from 0 to 1000, found -1"},
+      {R"({"fixture":{"post":3}})", "$.fixture.post: unknown key"},
+      {R"({"mounting":{"offset_mm":[1,2]}})", "$.mounting.offset_mm: expected a list of 3 numbers, found a list of 2"},
+      {R"({"mounting":{"offset_mm":[0,0,-1]}})", "$.mounting.offset_mm: the object would stand below the post's top"},
+      {R"({"mounting":{"turn_deg":361}})", "$.mounting.turn_deg: expected a number from -360 to 360, found 361"},
       {R"({"cell":""})", "$.cell: expected a text of 1 to 4096 bytes, found 0"},
       {R"({"dry_run":"yes"})", "$.dry_run: expected true or false, found \"yes\""},
       {R"({"size_cm":8})", "$.size_cm: unknown key; did you mean \"size_mm\"?"},
@@ -159,6 +169,14 @@ TEST(JobSettings, OptionsOfTheStages) {
       plan_options(job_settings_from_json(R"({"max_incidence_deg":30,"preferred_incidence_deg":10})"));
   EXPECT_DOUBLE_EQ(plan.max_incidence, std::numbers::pi / 6);
   EXPECT_DOUBLE_EQ(plan.preferred_incidence, std::numbers::pi / 18);
+
+  const MountingOptions as_the_cell = mounting_options(JobSettings{});
+  EXPECT_FALSE(as_the_cell.post_height_m || as_the_cell.post_radius_m || as_the_cell.plate_radius_m);
+  const MountingOptions mounting = mounting_options(
+      job_settings_from_json(R"({"fixture":{"post_height_mm":80},"mounting":{"offset_mm":[1,-2,3],"turn_deg":90}})"));
+  EXPECT_DOUBLE_EQ(mounting.post_height_m.value(), .08);
+  EXPECT_DOUBLE_EQ(mounting.offset_m[1], -.002);
+  EXPECT_DOUBLE_EQ(mounting.turn, std::numbers::pi / 2);
 }
 
 TEST(JobSettings, NamesOfChoicesAreThoseOfTheFile) {
