@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sim/wire/fault_script.h"
+#include "sim/wire/true_cell.h"
 
 /// Makes a fault script happen: told of every message and of time, it says what becomes of an exchange, and acts on the
 /// cell. One thread, the cell's.

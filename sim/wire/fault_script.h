@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "sim/wire/true_cell.h"
+#include "sim/wire/cell_phase.h"
 
 /// What shall go wrong in a simulated cell, and when. Data only: config/fault_script_file reads it from JSON,
 /// sim/wire/fault_injector makes it happen.
@@ -58,7 +58,7 @@ struct WireFault {
   FaultTrigger trigger;
   std::uint64_t messages = 1;  ///< how many exchanges in a row it takes, if it is of an exchange
   double duration_s = .05;
-  int axis = kJ1;
+  int axis = 0;  ///< of j1, j2, j3, j4, a, c
   double amount = 0;
 };
 

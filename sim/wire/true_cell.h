@@ -7,6 +7,7 @@
 #include "planner/cell_description.h"
 #include "sim/devices/axis_motion.h"
 #include "sim/devices/emission_record.h"
+#include "sim/wire/cell_phase.h"
 
 /// What the simulated cell truly is behind all its wires: six axes, one laser head with its gate, an interlock, and the
 /// record of emissions. Everything happens at a time that the caller gives, so the same cell runs on a scaled clock or
@@ -20,10 +21,6 @@
 namespace hilbrush {
 
 class TimeRecord;
-
-/// Where one dot's work stands, as the mechanics and the light have it.
-enum class CellPhase { kSettled, kMoving, kSettling, kPulse };
-inline constexpr std::array<const char*, 4> kCellPhaseNames{"settled", "moving", "settling", "pulse"};
 
 struct TrueCellOptions {
   double start_delay_s = 5;  ///< from the order to emit until light may come (CDRH)

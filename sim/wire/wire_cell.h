@@ -4,27 +4,14 @@
 #include <vector>
 
 #include "sim/wire/endpoints.h"
-#include "sim/wire/fault_script.h"
 #include "sim/wire/time_record.h"
 #include "sim/wire/true_cell.h"
+#include "sim/wire/wire_options.h"
 
 /// The simulated cell on wires: device servers on TCP ports of this machine (chosen by the system) and
 /// pseudo-terminals, all in front of one TrueCell, on a clock that runs at a scale. A thread of its own serves them
 /// from construction to destruction. Its public functions may be called from any thread.
 namespace hilbrush {
-
-struct WireOptions {
-  enum class Table { kOrientalAz, kCia402, kLeadshinePr };
-  enum class LaserHead { kObis, kCobolt };
-  Table table = Table::kOrientalAz;
-  bool is_table_serial = false;  ///< Modbus RTU on a pseudo-terminal instead of TCP
-  LaserHead laser = LaserHead::kObis;
-  bool is_laser_serial = false;                ///< a pseudo-terminal instead of a TCP port
-  double time_scale = 1;                       ///< wall seconds of one cell second, > 0
-  double steps_per_deg = 2777.77777777777777;  ///< a motor of 10,000 steps a turn behind a gear of 100
-  double start_delay_s = 5, warm_up_s = 0;
-  FaultScript faults;
-};
 
 class WireCell {
  public:
