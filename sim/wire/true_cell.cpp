@@ -44,7 +44,7 @@ void TrueCell::move_axis(int axis, double target, double speed_scale) {
 void TrueCell::move_axis(int index, double target, double speed_max, double acceleration) {
   const AxisDescription& description = limits(index);
   Axis& axis = axes_[static_cast<std::size_t>(index)];
-  const double distance = std::abs(target - axis.motion.position(now_s_));
+  const double distance = std::abs(target - axis.motion.position(now_s_) - drift(axis));
   axis.target = target;
   if (axis.is_jammed) return;
   if (distance == 0 && now_s_ >= axis.motion.end_s()) return;

@@ -19,7 +19,9 @@ struct LibraryRule {
 
 // What is plain enough for everybody below daemon/: options and nouns of std and Eigen only.
 constexpr const char* kOptionHeaders =
-    "sampling/(sample_options|tone|input_error|check)\\.h|planner/(plan_options|cell_description|sha256)\\.h";
+    "sim/wire/(fault_script|cell_phase|endpoints)\\.h|sampling/(sample_options|tone|input_error|check)\\.h|planner/"
+    "(plan_options|cell_description|sha256)\\.h|"
+    "drivers/device_options\\.h";
 constexpr const char* kCellModelHeaders =
     "planner/(cell_description|exposure_program|program_file|sha256|time_model|plan_options)\\.h";
 constexpr const char* kPosix =
@@ -36,6 +38,7 @@ const LibraryRule kRules[]{
     {"planner", "planner/.*", "planner/.*|sampling/[^/]+\\.h", "Eigen/.*|embree3/.*|tbb/.*|oneapi/.*"},
     {"drivers", "drivers/.*", "drivers/.*", "modbus/.*|modbus\\.h|libserialport\\.h"},
     {"sim_devices", "sim/devices/.*", "sim/devices/.*|drivers/.*", "Eigen/.*"},
+    {"sim_wire", "sim/wire/.*", "sim/wire/.*|sim/devices/[^/]+\\.h|drivers/(clock|steady_clock)\\.h", ""},
     {"film", "sim/film/.*", "sim/film/.*|sim/devices/emission_record\\.h|sampling/[^/]+\\.h|sampling/images/.*",
      "Eigen/.*|embree3/.*|tbb/.*|oneapi/.*"},
     {"config", "config/.*", "config/.*", "nlohmann/.*|Eigen/.*"},
@@ -52,10 +55,10 @@ bool may_use_options(std::string_view library) {
   return library == "config" || library == "light programs";
 }
 bool may_use_cell_model(std::string_view library) {
-  return library == "sim_devices" || library == "film" || library == "light programs";
+  return library == "sim_devices" || library == "sim_wire" || library == "film" || library == "light programs";
 }
 bool may_use_posix(std::string_view library) {
-  return library == "drivers" || library == "sim_devices" || library == "cell_model";
+  return library == "drivers" || library == "sim_devices" || library == "sim_wire" || library == "cell_model";
 }
 
 const LibraryRule* rule_of(const std::string& path) {
@@ -151,6 +154,7 @@ TEST(Includes, TheTableRefusesWhatItShould) {
   EXPECT_TRUE(refused("drivers/laser.h", "Eigen/Core", false));
   EXPECT_TRUE(refused("sim/devices/sim_cell.cpp", "sampling/textured_mesh.h", true));
   EXPECT_TRUE(refused("sim/film/film.cpp", "planner/plan.h", true));
+  EXPECT_TRUE(refused("sim/wire/dobot_controller.cpp", "drivers/dobot_codec.h", true));
   EXPECT_TRUE(refused("config/cell_file.cpp", "sampling/textured_mesh.h", true));
   EXPECT_TRUE(refused("daemon/server/server.cpp", "sim/film/film.h", true));
   EXPECT_TRUE(refused("daemon/hilbrushd_main.cpp", "planner/plan.h", true));
