@@ -7,6 +7,8 @@
 #include <sstream>
 #include <system_error>
 
+#include "config/cell_devices.h"
+#include "config/config_folders.h"
 #include "config/json_reader.h"
 #include "planner/sha256.h"
 
@@ -146,7 +148,7 @@ void read_timing(JsonObject& json, CellDescription::Timing& timing) {
   if (timing.settle_min_s > timing.settle_max_s) json.refuse("settle_max_ms", "below settle_min_ms");
 }
 
-CellDescription read_cell(JsonObject& json) {
+CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOptions& device_options) {
   CellDescription cell;
   cell.name = json.text("name", 100);
   json.object("axes", [&](JsonObject& axes) {
@@ -164,11 +166,7 @@ CellDescription read_cell(JsonObject& json) {
   json.object("laser", [&](JsonObject& laser) { read_laser(laser, cell.laser); });
   json.object("paint", [&](JsonObject& paint) { read_paint(paint, cell.paint); });
   json.object("timing", [&](JsonObject& timing) { read_timing(timing, cell.timing); });
-  json.object("devices", [&](JsonObject& devices) {
-    cell.devices.robot = devices.text("robot", 100);
-    cell.devices.table = devices.text("table", 100);
-    cell.devices.laser = devices.text("laser", 100);
-  });
+  json.object("devices", [&](JsonObject& devices) { device_options = read_cell_devices(devices, cell, folder); });
   json.object("simulation", [&](JsonObject& simulation) {
     cell.simulation.time_scale = simulation.number("time_scale", {0, 1000});
   });
@@ -178,21 +176,36 @@ CellDescription read_cell(JsonObject& json) {
 /// The folder that holds the shipped cells. The environment is read here because no setting is known yet when a cell is
 /// looked for.
 fs::path cells_folder() {
-  std::error_code error;
   if (const char* folder = std::getenv("HILBRUSH_CELLS"); folder != nullptr && *folder != '\0') return folder;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  fs::path installed = program.parent_path().parent_path() / "share" / "hilbrush" / "cells";
-  if (!error && fs::is_directory(installed, error)) return installed;
-  return HILBRUSH_SOURCE_CELLS;
+  return shipped_folder("cells");
+}
+
+struct CellFile {
+  CellDescription cell;
+  CellDeviceOptions devices;
+};
+
+CellFile read_cell_file(const std::string& text, const std::string& origin) {
+  CellFile file;
+  const fs::path folder = fs::path(origin).parent_path();
+  read_json_object(text, origin, [&](JsonObject& json) { file.cell = read_cell(json, folder, file.devices); },
+                   {.bytes = kCellBytesMax});
+  file.cell.sha256 = sha256_hex(text);
+  return file;
 }
 
 }  // namespace
 
 CellDescription cell_from_json(const std::string& text, const std::string& origin) {
-  CellDescription cell;
-  read_json_object(text, origin, [&](JsonObject& json) { cell = read_cell(json); }, {.bytes = kCellBytesMax});
-  cell.sha256 = sha256_hex(text);
-  return cell;
+  return read_cell_file(text, origin).cell;
+}
+
+CellDeviceOptions cell_devices_from_json(const std::string& text, const std::string& origin) {
+  return read_cell_file(text, origin).devices;
+}
+
+CellDeviceOptions load_cell_devices(const fs::path& file) {
+  return cell_devices_from_json(read_text_file(file.string(), kCellBytesMax), file.string());
 }
 
 CellDescription load_cell(const fs::path& file) {

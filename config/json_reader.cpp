@@ -204,6 +204,17 @@ JsonObject::JsonObject(const Json& value, std::string origin, std::string path)
   if (!value.is_object()) throw InputError(join(origin_, path_), "expected an object, found " + describe(value));
 }
 
+bool JsonObject::is_text(const std::string& key) const {
+  const auto found = value_.find(key);
+  return found != value_.end() && found->is_string();
+}
+
+std::vector<std::string> JsonObject::keys() const {
+  std::vector<std::string> names;
+  for (const auto& [key, ignored] : value_.items()) names.push_back(key);
+  return names;
+}
+
 std::string JsonObject::path_of(const std::string& key) const {
   return join(origin_, path_ + path_step(key));
 }

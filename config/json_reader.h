@@ -34,7 +34,9 @@ class JsonObject {
  public:
   JsonObject(const nlohmann::json& value, std::string origin, std::string path);
 
-  bool has(const std::string& key) const;  ///< and not null
+  bool has(const std::string& key) const;      ///< and not null
+  bool is_text(const std::string& key) const;  ///< for keys that may hold a text or something else
+  std::vector<std::string> keys() const;       ///< for objects whose keys are names
 
   /// A number whose key ends in a unit, in SI units. See json_reader.cpp for the units.
   double quantity(const std::string& key, JsonRange range);

@@ -13,6 +13,8 @@ class Clock {
   /// Ends a sleep early; may be called from any thread. A wake() that finds nobody asleep ends the next sleep at once,
   /// so that a thread which looks at a flag and then goes to sleep misses nothing.
   virtual void wake() = 0;
+  /// Wall seconds that `cell_s` seconds of the cell take; for those who wait on wires and not on this clock.
+  virtual double wall_s(double cell_s) const { return cell_s; }
 };
 
 }  // namespace hilbrush

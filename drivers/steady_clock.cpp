@@ -5,7 +5,7 @@
 namespace hilbrush {
 
 double SteadyClock::now_s() const {
-  return std::chrono::duration<double>(Steady::now() - start_).count();
+  return std::chrono::duration<double>(Steady::now() - start_).count() / scale_;
 }
 
 void SteadyClock::sleep_until(double time_s) {
@@ -16,7 +16,7 @@ void SteadyClock::sleep_until(double time_s) {
   while (!is_wake_pending_) {
     const double remaining_s = time_s - now_s();
     if (!(remaining_s > 0)) return;
-    const auto wait = std::chrono::duration<double>(std::min(remaining_s, kLongestWaitS));
+    const auto wait = std::chrono::duration<double>(std::min(remaining_s * scale_, kLongestWaitS));
     woken_.wait_for(lock, std::chrono::ceil<Steady::duration>(wait), [this] { return is_wake_pending_; });
   }
   is_wake_pending_ = false;

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "config/cell_file.h"
+#include "daemon/server/access.h"
 #include "daemon/server/audit_log.h"
 #include "daemon/server/cell_desk.h"
 #include "daemon/server/cell_devices.h"
@@ -60,10 +61,14 @@ fs::path made_folder(const fs::path& folder) {
 
 CellDescription described_cell(const fs::path& file, const std::optional<double>& time_scale) {
   CellDescription description = load_cell(file);
+  // A wire has no virtual time: its drivers take 0 for 1.
+  const auto& devices = description.devices;
+  const bool is_simulated =
+      devices.robot == "simulated" && devices.table == "simulated" && devices.laser == "simulated";
+  if (!is_simulated && description.simulation.time_scale <= 0) description.simulation.time_scale = 1;
   if (!time_scale) return description;
   if (!(*time_scale >= 0 && *time_scale <= 1000)) throw InputError("--time-scale", "must be 0 to 1000");
-  if (description.devices.robot != "simulated")
-    throw InputError("--time-scale", "is for simulated cells only: real time can't be scaled");
+  if (!is_simulated) throw InputError("--time-scale", "is for simulated cells only: real time can't be scaled");
   description.simulation.time_scale = *time_scale;
   return description;
 }
@@ -77,7 +82,8 @@ struct Daemon::Implementation {
   LockFile state_lock, socket_lock;
   fs::path cell_file;
   CellDescription description;
-  std::string notice;
+  Access access;
+  std::string notice, tcp_address;
   JobStore store;
   AuditLog audit;
   std::unique_ptr<CellDevices> devices;
@@ -98,9 +104,10 @@ struct Daemon::Implementation {
         socket_lock(given.socket.string() + ".lock", given.socket.string()),
         cell_file(fs::absolute(find_cell(given.cell))),
         description(described_cell(cell_file, given.time_scale)),
+        access(given.settings),
         store(state / "jobs.sqlite", &notice),
         audit(state / "audit.log"),
-        devices(make_cell_devices(description)),
+        devices(given.make_devices ? given.make_devices(description) : make_cell_devices(description, cell_file)),
         thread(*devices, description, post),
         children(given.pipeline,
                  ChildLimits{.silence_s = given.pipeline_silence_s, .resident_bytes = given.pipeline_memory_mb << 20}),
@@ -108,8 +115,12 @@ struct Daemon::Implementation {
         book({made_folder(state / "jobs"), cell_file}, store, desk, thread, children, description, post),
         methods(book, desk, audit, [this] { return info(); }) {
     book.on_change = [this](const Job& job) { server.notify(job); };
-    book.restore();
-    server.listen(options.socket, methods, book);
+    if (const std::string found = book.restore(); !found.empty()) notice += (notice.empty() ? "" : "; ") + found;
+    server.listen(options.socket, {methods, book, access});
+    if (const auto& tcp = options.settings.tcp)
+      tcp_address = tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, book, access}));
+    constexpr double kLookS = .05;
+    server.every(kLookS, [this] { desk.look_at_devices(); });
   }
 
   Json info() const {
@@ -118,13 +129,16 @@ struct Daemon::Implementation {
             {"pid", ::getpid()},
             {"uptime_s", uptime.count()},
             {"socket", options.socket.string()},
+            {"tcp", tcp_address.empty() ? Json(nullptr) : Json(tcp_address)},
             {"state", state.string()},
             {"cell_file", cell_file.string()},
             {"pipeline", options.pipeline.string()},
             {"pipeline_silence_s", options.pipeline_silence_s},
             {"pipeline_memory_mb", options.pipeline_memory_mb},
             {"clients", server.client_count()},
-            {"jobs", book.jobs().size()}};
+            {"jobs", book.jobs().size()},
+            {"store_fault", book.store_fault().empty() ? Json(nullptr) : Json(book.store_fault())},
+            {"journal_window", Journal::kWindow}};
   }
 
   /// Laser off first; then the executor is waited for, so that the job's last state is kept.
@@ -145,8 +159,19 @@ struct Daemon::Implementation {
 Daemon::Daemon(const DaemonOptions& options) : implementation_(std::make_unique<Implementation>(options)) {}
 Daemon::~Daemon() = default;
 
-void Daemon::end_on_signals() {
-  implementation_->server.on_termination([this] { implementation_->end(); });
+void Daemon::end_on_signals(std::function<void()> on_signal) {
+  implementation_->server.on_termination([this, on_signal = std::move(on_signal)] {
+    if (on_signal) on_signal();
+    implementation_->end();
+  });
+}
+
+void Daemon::every(double period_s, std::function<void()> task) {
+  implementation_->server.every(period_s, std::move(task));
+}
+
+const std::string& Daemon::tcp_address() const {
+  return implementation_->tcp_address;
 }
 
 void Daemon::run() {

@@ -17,8 +17,7 @@ class SimClock final : public Clock {
   void wake() override;
 
   bool is_virtual() const { return time_scale_ <= 0; }
-  /// Wall seconds that `cell_s` cell seconds take.
-  double wall_s(double cell_s) const { return is_virtual() ? 0 : cell_s * time_scale_; }
+  double wall_s(double cell_s) const override { return is_virtual() ? 0 : cell_s * time_scale_; }
   /// Virtual time jumps forward to time_s (never back); scaled time passes by itself. From any thread.
   void jump_to(double time_s);
 

@@ -1,0 +1,39 @@
+#pragma once
+#include <functional>
+
+#include "drivers/clock.h"
+#include "drivers/dobot_robot.h"
+
+namespace hilbrush {
+
+/// One digital output of the robot as a gate. What is known of it, and from when, is kept apart from what the frames
+/// show: a frame may be older than the last answer.
+class DobotRobot::OutputGate final : public Gate {
+ public:
+  OutputGate(DobotRobot& robot, int output) : robot_(robot), output_(output) {}
+
+  double resolution_s() const override { return 1e-3; }
+  void pulse(double pulse_s) override;
+  bool off() noexcept override;
+  bool is_on() override;
+  void set_listener(std::function<void()> on_dark) override;
+
+  /// Reader's thread, under the robot's mutex: false if the output is on though nobody ordered it.
+  bool agrees_with(const DobotFrame& frame);
+  bool is_pulsing() const { return is_pulsing_; }  ///< under the robot's mutex
+  /// The robot was disconnected or lost: nothing is known. Under the robot's mutex.
+  void forget() { is_known_off_ = false; }
+
+ private:
+  void note_off();
+  void tell_dark();
+
+  DobotRobot& robot_;
+  const int output_;
+  std::function<void()> on_dark_;
+  bool is_pulsing_ = false;        ///< ordered and not confirmed over; under the robot's mutex, like the rest
+  bool is_known_off_ = false;      ///< confirmed by the controller, and nothing ordered since
+  std::uint64_t known_frame_ = 0;  ///< frames that had come by then
+};
+
+}  // namespace hilbrush

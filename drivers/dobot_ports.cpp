@@ -1,0 +1,227 @@
+#include "drivers/dobot_ports.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+
+namespace hilbrush {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+constexpr double kConnectS = 2;
+constexpr std::size_t kOwedMax = 64;
+
+std::string refused(const std::string& command, const DobotReply& reply) {
+  return "the robot: " + command + " " + dobot_error_text(reply.error);
+}
+
+}  // namespace
+
+DobotPorts::DobotPorts(const DobotOptions& options, double feedback_silence_s)
+    : options_(options), feedback_silence_s_(feedback_silence_s) {
+  wake_fd_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+}
+
+DobotPorts::~DobotPorts() {
+  close();
+  ::close(wake_fd_);
+}
+
+void DobotPorts::open(Listener listener) {
+  close();
+  listener_ = std::move(listener);
+  motion_ = open_tcp_link(options_.host, options_.motion_port, deadline_in(kConnectS));
+  feedback_ = open_tcp_link(options_.host, options_.feedback_port, deadline_in(kConnectS));
+  frames_ = {};
+  replies_.clear();
+  feedback_deadline_ = deadline_in(feedback_silence_s_ + kConnectS);
+  {
+    const std::lock_guard lock(mutex_);
+    owed_.clear();
+    waited_for_ = 0;
+    refusal_.clear();
+    is_lost_ = false;
+    lost_sentence_.clear();
+  }
+  std::uint64_t ignored = 0;
+  [[maybe_unused]] const ssize_t got = ::read(wake_fd_, &ignored, sizeof ignored);
+  reader_ = std::thread([this] { run(); });
+}
+
+void DobotPorts::close() noexcept {
+  if (reader_.joinable()) {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof one);
+    reader_.join();
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    is_lost_ = true;
+    if (lost_sentence_.empty()) lost_sentence_ = "the robot is not connected";
+  }
+  const std::lock_guard lock(dashboard_mutex_);
+  dashboard_.reset();
+  motion_.reset();
+  feedback_.reset();
+}
+
+std::string DobotPorts::exchange(const std::string& command, Deadline deadline) {
+  if (!dashboard_) dashboard_ = open_tcp_link(options_.host, options_.dashboard_port, deadline);
+  dashboard_->write(command, deadline);
+  DobotReplyStream replies;
+  for (;;) {
+    std::array<char, 1024> bytes{};
+    const std::size_t got = dashboard_->read(bytes.data(), bytes.size(), deadline);
+    if (got == 0) throw LinkError("the robot does not answer " + command + dashboard_->messages().text());
+    dashboard_->messages().received({bytes.data(), got});
+    replies.push({bytes.data(), got});
+    if (const auto text = replies.next()) {
+      const auto reply = decode_dobot_reply(*text);
+      if (!reply || !is_dobot_echo(reply->command, command) || !replies.is_empty())
+        throw LinkError("the robot gives no proper answer to " + command + dashboard_->messages().text());
+      if (reply->error != 0) throw DriverError(refused(command, *reply) + dashboard_->messages().text());
+      return reply->values;
+    }
+    if (replies.is_overlong())
+      throw LinkError("the robot gives an endless answer to " + command + dashboard_->messages().text());
+  }
+}
+
+std::string DobotPorts::dashboard(const std::string& command, double wall_s) {
+  const Deadline deadline = deadline_in(wall_s);
+  const std::unique_lock lock(dashboard_mutex_, deadline);
+  if (!lock) throw LinkError("the robot's dashboard is busy with a command that gets no answer");
+  try {
+    return exchange(command, deadline);
+  } catch (const LinkError&) {
+    dashboard_.reset();
+    throw;
+  }
+}
+
+void DobotPorts::motion(const std::string* commands, std::size_t count, std::size_t later_count, OnReply on_later) {
+  std::string bytes;
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_lost_) throw LinkError(lost_sentence_);
+    if (owed_.size() + count > kOwedMax) throw DriverError("the robot owes too many answers");
+    for (std::size_t i = 0; i < count; ++i) {
+      owed_.push_back({commands[i], i + 1 == count ? on_later : OnReply{}});
+      if (i < count - later_count)
+        owed_.back().on_reply = [this, command = commands[i]](const DobotReply* reply) {
+          const std::lock_guard reply_lock(mutex_);
+          if (waited_for_ == 0) return;  // nobody waits any more
+          --waited_for_;
+          if (reply == nullptr)
+            refusal_ = "the robot: " + command + " was overtaken by a stop";
+          else if (reply->error != 0)
+            refusal_ = refused(command, *reply);
+        };
+      bytes += commands[i];
+    }
+    waited_for_ = count - later_count;
+    refusal_.clear();
+  }
+  motion_->write(bytes, deadline_in(kReplyS));
+  std::unique_lock lock(mutex_);
+  const bool is_answered =
+      answered_.wait_until(lock, deadline_in(kReplyS), [this] { return waited_for_ == 0 || is_lost_; });
+  if (is_lost_) throw LinkError(lost_sentence_);
+  if (!is_answered) {
+    waited_for_ = 0;
+    const std::string sentence = "the robot does not answer " + bytes + motion_->messages().text();
+    lock.unlock();
+    fail(sentence);  // whatever it answers later would be taken for the answer to something else
+    throw LinkError(sentence);
+  }
+  if (!refusal_.empty()) throw DriverError(refusal_ + motion_->messages().text());
+}
+
+void DobotPorts::forget_owed() {
+  std::deque<OnReply> callbacks;
+  {
+    const std::lock_guard lock(mutex_);
+    for (Owed& owed : owed_) {
+      owed.is_forgotten = true;
+      if (owed.on_reply) callbacks.push_back(std::move(owed.on_reply));
+      owed.on_reply = {};
+    }
+  }
+  for (const OnReply& callback : callbacks) callback(nullptr);
+  answered_.notify_all();
+}
+
+/// Reader's thread, or the one that gave up waiting. Says it once.
+void DobotPorts::fail(const std::string& sentence) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_lost_) return;
+    is_lost_ = true;
+    lost_sentence_ = sentence;
+  }
+  forget_owed();
+  listener_.on_lost(sentence);
+}
+
+void DobotPorts::run() {
+  try {
+    for (;;) {
+      std::array<pollfd, 3> polled{pollfd{wake_fd_, POLLIN, 0}, pollfd{motion_->descriptor(), POLLIN, 0},
+                                   pollfd{feedback_->descriptor(), POLLIN, 0}};
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(feedback_deadline_ - Steady::now()).count();
+      const int ready = ::poll(polled.data(), polled.size(), static_cast<int>(std::max<long long>(left, 0)));
+      if (ready < 0 && errno != EINTR) throw LinkError("the robot's ports can't be polled");
+      if (polled[0].revents != 0) return;
+      if (ready > 0 && polled[1].revents != 0) read_motion();
+      if (ready > 0 && polled[2].revents != 0) read_feedback();
+      if (Steady::now() >= feedback_deadline_)
+        throw LinkError("the robot's feedback has stopped (" + feedback_->name() + ")");
+    }
+  } catch (const DriverError& error) {
+    fail(error.what());
+  }
+}
+
+void DobotPorts::read_feedback() {
+  std::array<char, 8 * kDobotFrameBytes> bytes{};
+  const std::size_t got = feedback_->read(bytes.data(), bytes.size(), Steady::now());
+  frames_.push({bytes.data(), got});
+  while (const auto frame = frames_.next()) {
+    feedback_deadline_ = deadline_in(feedback_silence_s_);
+    listener_.on_frame(*frame);
+  }
+}
+
+void DobotPorts::read_motion() {
+  std::array<char, 1024> bytes{};
+  const std::size_t got = motion_->read(bytes.data(), bytes.size(), Steady::now());
+  if (got == 0) return;
+  motion_->messages().received({bytes.data(), got});
+  replies_.push({bytes.data(), got});
+  while (const auto text = replies_.next()) settle_reply(*text);
+  if (replies_.is_overlong()) throw LinkError("the robot gives an endless answer" + motion_->messages().text());
+}
+
+/// Answers come in the order of the commands. Those to commands that a stop has swept away may be missing.
+void DobotPorts::settle_reply(const std::string& text) {
+  const auto reply = decode_dobot_reply(text);
+  if (!reply) throw LinkError("the robot gives no proper answer" + motion_->messages().text());
+  OnReply callback;
+  {
+    const std::lock_guard lock(mutex_);
+    while (!owed_.empty() && owed_.front().is_forgotten && !is_dobot_echo(reply->command, owed_.front().command))
+      owed_.pop_front();
+    if (owed_.empty() || !is_dobot_echo(reply->command, owed_.front().command))
+      throw LinkError("the robot answers what it was not asked" + motion_->messages().text());
+    callback = std::move(owed_.front().on_reply);
+    owed_.pop_front();
+  }
+  if (callback) callback(&*reply);
+  answered_.notify_all();
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,24 @@
+#pragma once
+#include <functional>
+
+namespace hilbrush {
+
+/// What opens and closes the beam for one dot: a digital output of the robot's controller with the laser in external
+/// modulation, or the laser's own serial command. The pulse's end never depends on the caller being alive.
+class Gate {
+ public:
+  virtual ~Gate() = default;
+  /// The lengths it can time are whole multiples of this; 0: any.
+  virtual double resolution_s() const = 0;
+  /// Starts one pulse and returns when whoever times it has taken the whole of it. One thread.
+  /// @throws DriverError if it was refused; it is then off or turned off.
+  virtual void pulse(double pulse_s) = 0;
+  /// Off, now; a pulse that is queued or on is ended. From any thread, idempotent, bounded time. True if confirmed.
+  virtual bool off() noexcept = 0;
+  /// On, or a pulse is not yet confirmed over. Cheap, from any thread.
+  virtual bool is_on() = 0;
+  /// Called, from any thread, when is_on() has become false. Set once, before the first pulse.
+  virtual void set_listener(std::function<void()> on_dark) = 0;
+};
+
+}  // namespace hilbrush

@@ -1,0 +1,138 @@
+#include "drivers/gated_laser.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "drivers/driver_error.h"
+
+namespace hilbrush {
+namespace {
+
+constexpr double kRounding = 1e-6;  ///< programs keep power and pulse in single precision
+
+bool is_within(double value, double min, double max) {
+  return value >= min * (1 - kRounding) && value <= max * (1 + kRounding);
+}
+
+}  // namespace
+
+GatedLaser::GatedLaser(std::unique_ptr<LaserHead> head, Gate& gate, const Limits& limits, Clock& clock)
+    : head_(std::move(head)), gate_(gate), limits_(limits), clock_(clock) {
+  gate_.set_listener([this] { note_dark(); });
+  head_->set_listener([this] { note_reading(); });
+}
+
+GatedLaser::~GatedLaser() {
+  disable();
+  gate_.set_listener({});
+}
+
+void GatedLaser::connect() {
+  if (!gate_.off()) throw DriverError("the laser cannot be connected: its gate does not confirm that it is off");
+  head_->connect();
+}
+
+void GatedLaser::check_powers() {
+  const LaserHead::Powers powers = head_->powers();
+  if (is_within(limits_.power_min_w, powers.min_w, powers.max_w) &&
+      is_within(limits_.power_max_w, powers.min_w, powers.max_w))
+    return;
+  char text[200];
+  std::snprintf(text, sizeof text, "the cell file gives the laser %.4g to %.4g mW, but it can do %.4g to %.4g mW",
+                limits_.power_min_w * 1e3, limits_.power_max_w * 1e3, powers.min_w * 1e3, powers.max_w * 1e3);
+  throw DriverError(text);
+}
+
+void GatedLaser::enable() {
+  if (!gate_.off()) throw DriverError("the laser cannot be enabled: its gate does not confirm that it is off");
+  check_powers();
+  head_->arm();
+  may_fire_ = true;
+}
+
+void GatedLaser::disable() noexcept {
+  may_fire_ = false;
+  gate_.off();
+  head_->disarm();
+}
+
+void GatedLaser::fire(double power_w, double pulse_s) {
+  const Status now = status();
+  if (now.state != DeviceState::kReady)
+    throw DriverError(std::string("the laser cannot be fired: it is ") + device_state_name(now.state) +
+                      (now.fault.empty() ? "" : ": " + now.fault));
+  if (!now.interlock_closed) throw DriverError("the laser cannot be fired: its interlock is open");
+  if (!is_within(power_w, limits_.power_min_w, limits_.power_max_w) ||
+      !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s)) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "the laser refuses a pulse of %.4g mW and %.4g ms: its limits are %.4g to %.4g mW and %.4g to %.4g ms",
+        power_w * 1e3, pulse_s * 1e3, limits_.power_min_w * 1e3, limits_.power_max_w * 1e3, limits_.pulse_min_s * 1e3,
+        limits_.pulse_max_s * 1e3);
+    throw DriverError(text);
+  }
+  // A gate that counts in whole steps gets the next longer one, at the power that keeps the energy.
+  const double step_s = gate_.resolution_s();
+  const double timed_s = step_s > 0 ? std::max(1., std::ceil(pulse_s / step_s - 1e-3)) * step_s : pulse_s;
+  head_->set_power(std::max(power_w * pulse_s / timed_s, limits_.power_min_w));
+  if (!may_fire_) throw DriverError("the laser cannot be fired: it was disabled");
+  {
+    const std::lock_guard lock(mutex_);
+    is_reading_due_ = true;
+    gate_dark_s_ = -1;
+  }
+  gate_.pulse(timed_s);
+}
+
+/// Any thread.
+void GatedLaser::note_dark() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!is_reading_due_ || gate_dark_s_ >= 0) return;
+    gate_dark_s_ = clock_.now_s();
+  }
+  head_->look();
+}
+
+/// Any thread.
+void GatedLaser::note_reading() {
+  const LaserHead::Status head = head_->status();
+  {
+    const std::lock_guard lock(mutex_);
+    const bool is_failed = head.state == DeviceState::kFault;
+    if (is_reading_due_ && gate_dark_s_ >= 0 && (is_failed || head.read_s >= gate_dark_s_)) {
+      is_reading_due_ = false;
+      dark_since_s_ = gate_dark_s_;
+    }
+  }
+  clock_.wake();
+}
+
+bool GatedLaser::off() noexcept {
+  return gate_.off();
+}
+
+Laser::Status GatedLaser::status() {
+  const LaserHead::Status head = head_->status();
+  Status status;
+  status.is_emitting = gate_.is_on();
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_reading_due_ && head.state == DeviceState::kReady) status.is_emitting = true;
+    status.dark_since_s = status.is_emitting ? 0 : dark_since_s_;
+  }
+  status.state = status.is_emitting && head.state == DeviceState::kReady ? DeviceState::kMoving : head.state;
+  status.interlock_closed = head.interlock_closed;
+  status.fault = head.fault;
+  return status;
+}
+
+void GatedLaser::clear_fault() {
+  may_fire_ = false;
+  if (!gate_.off()) throw DriverError("the laser's fault cannot be cleared: its gate does not confirm that it is off");
+  head_->clear_fault();
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,44 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "drivers/axis_group.h"
+#include "drivers/laser.h"
+
+namespace hilbrush {
+
+/// The enabling half of a laser: its own link, by which emission is armed, power is set and states are read. What
+/// opens the beam for one dot is its Gate.
+class LaserHead {
+ public:
+  struct Status {
+    DeviceState state = DeviceState::kDisconnected;  ///< kReady: armed
+    bool interlock_closed = false;
+    std::string fault;  ///< a sentence, if state is kFault
+    double read_s = 0;  ///< when the reading it comes from was begun, on the cell's clock
+  };
+  struct Powers {
+    double min_w = 0, max_w = 0;
+  };
+
+  virtual ~LaserHead() = default;
+  virtual void connect() = 0;                       ///< disconnected -> connected; emission off, and confirmed
+  virtual std::vector<std::string> identify() = 0;  ///< a line each, for people
+  virtual Powers powers() = 0;                      ///< the device's own limits, as read when it was connected
+  /// Key, interlock and faults are looked at, modulation is set, the start delay is waited for. @throws DriverError
+  virtual void arm() = 0;
+  /// Emission off. From any thread, idempotent, bounded. True if the device confirms it.
+  virtual bool disarm() noexcept = 0;
+  /// Sent only when it changes, and read back. @throws DriverError if the device has another power afterwards.
+  virtual void set_power(double power_w) = 0;
+  /// By the last reading: cheap, from any thread.
+  virtual Status status() = 0;
+  /// Asks for a reading as soon as the link is free, and returns. From any thread.
+  virtual void look() = 0;
+  virtual void clear_fault() = 0;
+  /// Called from any thread when status() has changed or a reading came that look() had asked for. Set once.
+  virtual void set_listener(std::function<void()> on_change) = 0;
+};
+
+}  // namespace hilbrush

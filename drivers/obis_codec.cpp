@@ -1,0 +1,99 @@
+#include "drivers/obis_codec.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+namespace hilbrush::obis {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
+  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+bool equals_word(std::string_view text, std::string_view word) {
+  return text.size() == word.size() && std::equal(text.begin(), text.end(), word.begin(), [](char a, char b) {
+           return std::toupper(static_cast<unsigned char>(a)) == b;
+         });
+}
+
+}  // namespace
+
+std::string encode(std::string_view command) {
+  return std::string(command) + "\r\n";
+}
+
+std::string power_command(double power_w) {
+  char text[64];
+  std::snprintf(text, sizeof text, "SOUR:POW:LEV:IMM:AMPL %.6f", power_w);
+  return text;
+}
+
+LineKind classify(std::string_view line) {
+  line = trimmed(line);
+  if (equals_word(line, "OK")) return LineKind::kOk;
+  return line.size() >= 3 && equals_word(line.substr(0, 3), "ERR") ? LineKind::kError : LineKind::kValue;
+}
+
+std::optional<double> decode_number(std::string_view line) {
+  line = trimmed(line);
+  if (!line.empty() && line.front() == '+') line.remove_prefix(1);
+  double value = 0;
+  const auto [rest, error] = std::from_chars(line.data(), line.data() + line.size(), value);
+  if (error != std::errc() || rest != line.data() + line.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::optional<bool> decode_switch(std::string_view line) {
+  line = trimmed(line);
+  if (equals_word(line, "ON") || line == "1") return true;
+  if (equals_word(line, "OFF") || line == "0") return false;
+  return std::nullopt;
+}
+
+std::optional<std::uint32_t> decode_hex_word(std::string_view line) {
+  line = trimmed(line);
+  if (line.size() > 2 && line[0] == '0' && (line[1] == 'x' || line[1] == 'X')) line.remove_prefix(2);
+  std::uint32_t value = 0;
+  const auto [rest, error] = std::from_chars(line.data(), line.data() + line.size(), value, 16);
+  if (error != std::errc() || rest != line.data() + line.size()) return std::nullopt;
+  return value;
+}
+
+std::string fault_text(std::uint32_t faults) {
+  struct Known {
+    std::uint32_t bit;
+    const char* meaning;
+  };
+  // Bit 0x2000 says that the laser is ready: no fault.
+  static constexpr Known kKnown[]{{0x1, "base plate temperature"},
+                                  {0x2, "diode temperature"},
+                                  {0x4, "internal temperature"},
+                                  {0x8, "supply voltage"},
+                                  {0x10, "internal bus (I2C)"},
+                                  {0x20, "over-current"},
+                                  {0x40, "checksum"},
+                                  {0x80, "recovery"},
+                                  {0x100, "buffer overflow"},
+                                  {0x200, "warm-up limit"},
+                                  {0x400, "cooler (TEC)"},
+                                  {0x800, "internal bus"},
+                                  {0x1000, "diode limit"},
+                                  {0x4000, "photodiode"},
+                                  {0x8000, "fatal"},
+                                  {0x10000, "start-up"},
+                                  {0x20000, "watchdog reset"},
+                                  {0x40000, "field calibration"},
+                                  {0x100000, "over-power"}};
+  std::string text;
+  for (const Known& known : kKnown)
+    if ((faults & known.bit) != 0) text += (text.empty() ? "" : ", ") + std::string(known.meaning);
+  return text;
+}
+
+}  // namespace hilbrush::obis
