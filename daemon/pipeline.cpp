@@ -16,6 +16,7 @@
 #include "daemon/executor.h"
 #include "daemon/job_sampling.h"
 #include "daemon/painted_dots.h"
+#include "daemon/planning_pictures.h"
 #include "daemon/report.h"
 #include "planner/mounting.h"
 #include "planner/mounting_advice.h"
@@ -216,6 +217,8 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   write_program(work.plan.program, output / "program.ply");
   save_dots(work, output / "dots.ply");
   report.files = {"report.json", "program.ply", "dots.ply"};
+  for (const auto& file : write_planning_pictures(piece.mesh, work.dots, work.plan, piece.cell, output))
+    report.files.push_back(file.filename().string());
   return work;
 }
 

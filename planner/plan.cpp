@@ -60,7 +60,7 @@ Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress&
   return plan;
 }
 
-TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program) {
+TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program, const TimeVisitor& visit) {
   TimeSplit time;
   Joints at = home_joints(cell);
   std::size_t next_via = 0;
@@ -77,6 +77,7 @@ TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& prog
     time.settle_s += settle_s(cell, at, exposure.joints);
     time.expose_s += static_cast<double>(exposure.pulse_s) + cell.timing.message_s;
     at = exposure.joints;
+    if (visit) visit(i, time);
   }
   return time;
 }

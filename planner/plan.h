@@ -73,8 +73,11 @@ struct Plan {
 /// Cost: O(dots), memory O(dots).
 Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress& progress = {});
 
+/// Told after each exposure what the program has taken so far.
+using TimeVisitor = std::function<void(std::size_t exposure, const TimeSplit& so_far)>;
+
 /// How long a program takes from home to home, by the time model.
-TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program);
+TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program, const TimeVisitor& visit = {});
 
 /// The checked way from measured joints to exposure `next` of the program: way-points, possibly none (the direct move
 /// is clear).

@@ -1,0 +1,227 @@
+#include "daemon/planning_pictures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "sampling/images/image_file.h"
+#include "sampling/plot.h"
+#include "sim/film/canvas.h"
+#include "sim/film/orthographic_view.h"
+#include "sim/film/views.h"
+
+namespace hilbrush {
+namespace {
+
+constexpr Color kBackground{104, 116, 130}, kSurface{150, 152, 154}, kBackFace{126, 106, 92}, kInk{245, 245, 245};
+constexpr Color kExposed{225, 228, 226}, kRetract{255, 255, 255};
+constexpr int kPad = 12, kViewPixels = 400, kScale = 2, kText = 7 * kScale;
+
+enum Row { kReach, kIncidence, kPath, kRowCount };
+constexpr std::array<const char*, kRowCount> kRowNames{"reach", "incidence", "path"};
+
+/// By SkipReason.
+constexpr std::array<Color, kSkipReasonCount> kReasonColors{{{120, 30, 160},
+                                                             {20, 80, 220},
+                                                             {240, 130, 0},
+                                                             {225, 20, 30},
+                                                             {110, 60, 10},
+                                                             {0, 0, 0},
+                                                             {0, 130, 120},
+                                                             {235, 80, 190}}};
+
+/// Evenly spaced colours from one end of a scale to the other.
+Color ramp(std::span<const Color> colors, double share) {
+  const double place = std::clamp(share, 0., 1.) * static_cast<double>(colors.size() - 1);
+  const std::size_t i = std::min(static_cast<std::size_t>(place), colors.size() - 2);
+  const double between = place - static_cast<double>(i);
+  Color color;
+  for (std::size_t k = 0; k < color.size(); ++k)
+    color[k] = static_cast<std::uint8_t>(std::lround(colors[i][k] + (colors[i + 1][k] - colors[i][k]) * between));
+  return color;
+}
+
+/// Dark blue along the normal, through pale yellow, to dark red at the limit of 45 degrees.
+Color incidence_color(double incidence) {
+  constexpr std::array<Color, 5> kColors{
+      {{49, 54, 149}, {116, 173, 209}, {254, 224, 144}, {244, 109, 67}, {165, 0, 38}}};
+  return ramp(kColors, incidence / (std::numbers::pi / 4));
+}
+
+/// From the first exposure (violet) to the last (yellow); hues far enough apart that neighbours in time look alike and
+/// others do not.
+Color order_color(double share) {
+  constexpr std::array<Color, 6> kColors{
+      {{70, 10, 120}, {50, 70, 200}, {20, 150, 190}, {40, 180, 90}, {170, 205, 50}, {250, 230, 30}}};
+  return ramp(kColors, share);
+}
+
+/// One view of the object, to draw rows of dots on.
+class ViewSheet {
+ public:
+  ViewSheet(const TexturedMesh& mesh, const ViewDirection& direction, double pixel_m)
+      : view_(mesh, direction, pixel_m, 2), tolerance_m_(2 * pixel_m) {}
+
+  int width() const { return view_.width(); }
+  int height() const { return view_.height(); }
+  std::optional<Eigen::Vector2i> pixel_of(const Eigen::Vector3d& p_O) const {
+    return view_.pixel_of(p_O, tolerance_m_);
+  }
+
+  void draw_surface(Canvas& canvas, int left, int top) const {
+    for (int y = 0; y < view_.height(); ++y)
+      for (int x = 0; x < view_.width(); ++x) {
+        const auto side = view_.pixel(x, y).side;
+        if (side == OrthographicView::Side::kBackground) continue;
+        canvas.set(left + x, top + y, side == OrthographicView::Side::kFront ? kSurface : kBackFace);
+      }
+  }
+
+ private:
+  OrthographicView view_;
+  double tolerance_m_;
+};
+
+/// What all three rows of all views are drawn from.
+struct PlanDrawing {
+  const DotSequence& dots;
+  const Plan& plan;
+  int mark_radius;  ///< half the pitch in pixels: dots cover the surface between them
+
+  void reach(const ViewSheet& view, Canvas& canvas, int left, int top) const {
+    const auto mark = [&](std::size_t dot, const Color& color, int radius) {
+      if (const auto pixel = view.pixel_of(dots.dots[dot].position_O))
+        canvas.mark(left + pixel->x(), top + pixel->y(), radius, color);
+    };
+    for (const Exposure& exposure : plan.program.exposures) mark(exposure.dot_index, kExposed, mark_radius);
+    for (const SkippedDot& skipped : plan.skipped)
+      mark(skipped.dot_index, kReasonColors[static_cast<std::size_t>(skipped.reason)], std::max(mark_radius, 1));
+  }
+
+  void incidence(const ViewSheet& view, Canvas& canvas, int left, int top) const {
+    for (const Exposure& exposure : plan.program.exposures)
+      if (const auto pixel = view.pixel_of(exposure.position_O))
+        canvas.mark(left + pixel->x(), top + pixel->y(), mark_radius,
+                    incidence_color(static_cast<double>(exposure.incidence)));
+  }
+
+  void path(const ViewSheet& view, Canvas& canvas, int left, int top) const {
+    const auto& exposures = plan.program.exposures;
+    const Eigen::Vector2i corner(left, top);
+    std::vector<Eigen::Vector2i> retracts;
+    Eigen::Vector2i last = corner;
+    bool is_last_seen = false;
+    for (std::size_t i = 0; i < exposures.size(); ++i) {
+      const auto pixel = view.pixel_of(exposures[i].position_O);
+      const Eigen::Vector2i here = pixel ? Eigen::Vector2i(corner + *pixel) : corner;
+      const bool is_retracted = !plan.program.vias_before(i).empty();
+      if (pixel && is_retracted) retracts.push_back(here);
+      if (pixel && is_last_seen && !is_retracted)
+        canvas.line(last.x(), last.y(), here.x(), here.y(),
+                    order_color(static_cast<double>(i) / static_cast<double>(exposures.size())));
+      last = here;
+      is_last_seen = pixel.has_value();
+    }
+    for (const Eigen::Vector2i& at : retracts) canvas.mark(at.x(), at.y(), 1, kRetract);
+  }
+};
+
+void write_legend_entry(Canvas& canvas, int& left, int top, const Color& color, const std::string& text) {
+  canvas.mark(left + kText / 2, top + kText / 2, kText / 2, color);
+  canvas.write(left + kText + kPad / 2, top, text, kScale, kInk);
+  left += kText + 2 * kPad + Canvas::text_width(text, kScale);
+}
+
+void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
+  int left = kPad;
+  if (row == kReach) {
+    std::array<std::size_t, kReasonColors.size()> counts{};
+    for (const SkippedDot& skipped : plan.skipped) ++counts[static_cast<std::size_t>(skipped.reason)];
+    write_legend_entry(canvas, left, top, kExposed, std::to_string(plan.program.exposures.size()) + " exposed");
+    for (std::size_t r = 0; r < counts.size(); ++r)
+      if (counts[r] > 0)
+        write_legend_entry(canvas, left, top, kReasonColors[r],
+                           std::to_string(counts[r]) + " " + skip_reason_name(static_cast<SkipReason>(r)));
+  } else if (row == kIncidence) {
+    for (const int degrees : {0, 10, 20, 30, 40, 45})
+      write_legend_entry(canvas, left, top, incidence_color(degrees * std::numbers::pi / 180),
+                         std::to_string(degrees) + " deg");
+  } else {
+    write_legend_entry(canvas, left, top, order_color(0), "first");
+    write_legend_entry(canvas, left, top, order_color(.5), "half way");
+    write_legend_entry(canvas, left, top, order_color(1), "last");
+    write_legend_entry(canvas, left, top, kRetract, "after a retract");
+  }
+}
+
+Canvas planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const Plan& plan) {
+  const auto [low, high] = bounds(mesh);
+  const double pixel_m = (high - low).maxCoeff() / kViewPixels;
+  const PlanDrawing drawing{dots, plan, std::clamp(static_cast<int>(dots.pitch_m / pixel_m / 2), 0, kViewPixels / 20)};
+  std::vector<std::pair<const char*, ViewSheet>> views;
+  int width = kPad, height = 0;
+  for (const ViewDirection& direction : picture_views()) {
+    views.emplace_back(direction.name, ViewSheet(mesh, direction, pixel_m));
+    const std::string longest = std::string(direction.name) + ", " + kRowNames[kIncidence];
+    width += std::max(views.back().second.width(), Canvas::text_width(longest, kScale)) + kPad;
+    height = std::max(height, views.back().second.height());
+  }
+  constexpr int kNarrowest = 900;  // for the legends
+  const int row_height = 2 * (kText + kPad) + height + kPad;
+  Canvas canvas(std::max(width, kNarrowest), kRowCount * row_height + kPad, kBackground);
+  for (int row = 0; row < kRowCount; ++row) {
+    int left = kPad;
+    const int top = kPad + row * row_height;
+    for (const auto& [name, view] : views) {
+      const std::string caption = std::string(name) + ", " + kRowNames[static_cast<std::size_t>(row)];
+      const int column = std::max(view.width(), Canvas::text_width(caption, kScale));
+      const int x = left + (column - view.width()) / 2, y = top + kText + kPad + (height - view.height()) / 2;
+      canvas.write(left, top, caption, kScale, kInk);
+      view.draw_surface(canvas, x, y);
+      if (row == kReach)
+        drawing.reach(view, canvas, x, y);
+      else if (row == kIncidence)
+        drawing.incidence(view, canvas, x, y);
+      else
+        drawing.path(view, canvas, x, y);
+      left += column + kPad;
+    }
+    write_legend(canvas, static_cast<Row>(row), top + kText + kPad + height + kPad, plan);
+  }
+  return canvas;
+}
+
+/// Curves of the time so far, by what it was spent on.
+Plot time_plot(const CellDescription& cell, const ExposureProgram& program) {
+  constexpr std::size_t kMostPoints = 400;
+  const std::size_t step = std::max<std::size_t>(1, program.exposures.size() / kMostPoints);
+  std::array<PlotSeries, 5> series{{{"in all", {}}, {"move", {}}, {"settle", {}}, {"expose", {}}, {"retract", {}}}};
+  estimate_time(cell, program, [&](std::size_t exposure, const TimeSplit& so_far) {
+    if (exposure % step != 0 && exposure + 1 != program.exposures.size()) return;
+    const auto x = static_cast<double>(exposure + 1);
+    const std::array<double, 5> seconds{so_far.total_s(), so_far.move_s, so_far.settle_s, so_far.expose_s,
+                                        so_far.retract_s};
+    for (std::size_t k = 0; k < series.size(); ++k) series[k].points.emplace_back(x, seconds[k]);
+  });
+  return {"Where the time goes", "exposures", "seconds so far", false, false, 0., {}, {series.begin(), series.end()}};
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> write_planning_pictures(const TexturedMesh& mesh, const DotSequence& dots,
+                                                           const Plan& plan, const CellDescription& cell,
+                                                           const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files{folder / "planning.png"};
+  save_png(planning_sheet(mesh, dots, plan).picture(), files.back());
+  if (!plan.program.exposures.empty()) {
+    files.push_back(folder / "time.svg");
+    write_svg(svg_of(time_plot(cell, plan.program)), files.back());
+  }
+  return files;
+}
+
+}  // namespace hilbrush
