@@ -201,7 +201,7 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   work.plan.program.provenance = piece.provenance;
   refuse_faulty_program(stages.run("check", [&](const Progress& progress) {
     return check_program(work.plan.program, work.plan.skipped, work.dots, piece.mesh, piece.cell,
-                         plan_options(piece.settings), 20, progress);
+                         plan_options(piece.settings), 20, progress, &piece.provenance);
   }));
 
   report.dots.placed = work.dots.dots.size();

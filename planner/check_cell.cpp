@@ -13,6 +13,7 @@ namespace hilbrush {
 namespace {
 
 constexpr int kRimRays = 15, kBundleRays = 16;  // one packet: the rim, and the axis
+constexpr std::size_t kWitnesses = 48;
 constexpr double kMillimetre = 1e-3;
 
 std::string millimetres(double length_m) {
@@ -62,6 +63,8 @@ CheckCell::CheckCell(const TexturedMesh& mesh, const CellDescription& cell)
   quill_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), cell.arm.quill_length_m, cell.arm.quill_radius_m};
   reach_m_ = std::hypot(cell.table.plate_radius_m, cell.fixture.post_height_m + cell.table.plate_thickness_m);
   for (const auto& p : mesh.vertices) reach_m_ = std::max(reach_m_, p.norm());
+  const std::size_t stride = std::max<std::size_t>(1, mesh.vertices.size() / kWitnesses);
+  for (std::size_t i = 0; i < mesh.vertices.size(); i += stride) witnesses_O_.push_back(mesh.vertices[i]);
 }
 
 CheckCell::~CheckCell() = default;
@@ -155,7 +158,8 @@ bool CheckCell::is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O,
   return std::any_of(std::begin(rays.tfar), std::end(rays.tfar), [](float t) { return t < 0; });
 }
 
-/// A packet of rays along the body: those of its mantle and its axis.
+/// A packet of rays along the body, those of its mantle and its axis; and vertices of the object inside it, for bodies
+/// so fat that all rays pass the object by.
 bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const {
   const Eigen::Vector3d u = body.axis_F.unitOrthogonal(), v = body.axis_F.cross(u);
   std::array<Eigen::Vector3d, kBundleRays> from_O, along_O;
@@ -166,7 +170,14 @@ bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_
     if (i < kRimRays) from_F += body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
     from_O[i] = X_OB * from_F;
   }
-  return is_any_blocked(from_O, along_O, body.length_m);
+  if (is_any_blocked(from_O, along_O, body.length_m)) return true;
+  const Eigen::Isometry3d X_BO = X_OB.inverse();
+  return std::any_of(witnesses_O_.begin(), witnesses_O_.end(), [&](const Eigen::Vector3d& p_O) {
+    const Eigen::Vector3d p_B = X_BO * p_O - body.from_F;
+    const double along_m = body.axis_F.dot(p_B);
+    return along_m > 0 && along_m < body.length_m &&
+           (p_B - along_m * body.axis_F).squaredNorm() < body.radius_m * body.radius_m;
+  });
 }
 
 /// The body's mantle against plate and post, and the plate's rim and the post's axis against the body.

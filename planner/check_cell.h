@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "planner/cell_description.h"
 #include "sampling/textured_mesh.h"
@@ -59,7 +60,8 @@ class CheckCell {
   CellDescription cell_;
   Eigen::Vector3d beam_F_;
   Cylinder lens_, quill_;
-  double reach_m_;  ///< radius of object, plate and post around O
+  double reach_m_;                            ///< radius of object, plate and post around O
+  std::vector<Eigen::Vector3d> witnesses_O_;  ///< some vertices of the object
   std::unique_ptr<Rays> rays_;
 };
 

@@ -61,6 +61,7 @@ class ProgramCheck {
 
   void check_counts(const std::vector<SkippedDot>& skipped, Faults& faults) const;
   void check_vias(Faults& faults) const;
+  void check_provenance(const Provenance& made_from, Faults& faults) const;
   void check_exposure(std::size_t i, Faults& faults) const;
   /// The way from exposure i - 1 (or home) to exposure i (or home, if i is the count).
   void check_way(std::size_t i, Faults& faults) const;
@@ -71,7 +72,7 @@ class ProgramCheck {
   void check_limits(const Joints& joints, std::size_t i, Faults& faults) const;
   void check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Faults& faults) const;
   void check_dose(std::size_t i, Faults& faults) const;
-  void check_direct_move(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
+  void check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
   void check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
   Joints home() const {
     Joints joints;
@@ -120,6 +121,17 @@ void ProgramCheck::check_vias(Faults& faults) const {
   if (program_.vias.empty() || program_.vias.back().before_exposure != program_.exposures.size() ||
       program_.vias.back().joints != home())
     faults.push_back({"the program does not end at home", program_.exposures.size()});
+}
+
+void ProgramCheck::check_provenance(const Provenance& made_from, Faults& faults) const {
+  const auto compare = [&](const std::string& said, const std::string& expected, const char* what) {
+    if (said != expected) faults.push_back({sentence("the program says it was made from another %s", what), 0});
+  };
+  const Provenance& said = program_.provenance;
+  compare(said.model_sha256, made_from.model_sha256, "model");
+  compare(said.settings_sha256, made_from.settings_sha256, "job's settings");
+  compare(said.cell_sha256, made_from.cell_sha256, "cell");
+  compare(said.version, made_from.version, "version of this program");
 }
 
 /// The comparison is such that NaN fails it.
@@ -199,8 +211,9 @@ void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
   if (auto fault = check_cell_.body_fault(joints); !fault.empty()) faults.push_back({fault, i});
 }
 
-/// What may only happen with the tool drawn back: the elbow going over, half a turn of J4 or C at once.
-void ProgramCheck::check_direct_move(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
+/// What may only happen with the tool drawn back, on no leg that begins or ends at a dot: the elbow going over, half a
+/// turn of J4 or C at once.
+void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
   if (from[kJ2] * to[kJ2] < 0) faults.push_back({"the elbow flips without a retract", i});
   for (const int axis : {kJ4, kRotation}) {
     const double turn = std::abs(to[static_cast<std::size_t>(axis)] - from[static_cast<std::size_t>(axis)]);
@@ -238,27 +251,27 @@ void ProgramCheck::check_way(std::size_t i, Faults& faults) const {
   // Joints outside their limits have been reported; no way leads to or from them.
   if (i > 0 && !is_inside(program_.exposures[i - 1].joints)) return;
   if (i < program_.exposures.size() && !is_inside(program_.exposures[i].joints)) return;
-  Joints at = i == 0 ? home() : program_.exposures[i - 1].joints;
-  const auto vias = program_.vias_before(i);
-  for (const Via& via : vias) {
-    check_leg(at, via.joints, i, faults);
-    at = via.joints;
+  std::vector<Joints> way{i == 0 ? home() : program_.exposures[i - 1].joints};
+  for (const Via& via : program_.vias_before(i)) way.push_back(via.joints);
+  if (i < program_.exposures.size()) way.push_back(program_.exposures[i].joints);
+  for (std::size_t leg = 1; leg < way.size(); ++leg) {
+    const bool leaves_dot = leg == 1 && i > 0, meets_dot = leg + 1 == way.size() && i < program_.exposures.size();
+    if (leaves_dot || meets_dot) check_leg_at_dot(way[leg - 1], way[leg], i, faults);
+    check_leg(way[leg - 1], way[leg], i, faults);
   }
-  if (i == program_.exposures.size()) return;
-  const Joints& to = program_.exposures[i].joints;
-  if (vias.empty()) check_direct_move(at, to, i, faults);
-  check_leg(at, to, i, faults);
 }
 
 }  // namespace
 
 std::vector<ProgramFault> check_program(const ExposureProgram& program, const std::vector<SkippedDot>& skipped,
                                         const DotSequence& dots, const TexturedMesh& mesh, const CellDescription& cell,
-                                        const PlanOptions& options, std::size_t limit, const Progress& progress) {
+                                        const PlanOptions& options, std::size_t limit, const Progress& progress,
+                                        const Provenance* made_from) {
   const ProgramCheck check(program, dots, mesh, cell, options);
   Faults faults;
   check.check_counts(skipped, faults);
   check.check_vias(faults);
+  if (made_from) check.check_provenance(*made_from, faults);
   if (!faults.empty()) {  // the rest relies on order and counts
     faults.resize(std::min(faults.size(), limit));
     return faults;

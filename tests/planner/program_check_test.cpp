@@ -20,9 +20,11 @@ struct Work {
   TexturedMesh mesh = ball(.02);
   DotSequence dots = scatter(mesh, 2e-3);
   Plan plan = plan_exposures(Reach(mesh, cell, options), dots);
+  Provenance made_from{"model", "settings", "cell", "version"};
 
+  Work() { plan.program.provenance = made_from; }
   std::vector<ProgramFault> check() const {
-    return check_program(plan.program, plan.skipped, dots, mesh, cell, options);
+    return check_program(plan.program, plan.skipped, dots, mesh, cell, options, 20, {}, &made_from);
   }
   Exposure& exposure(std::size_t i) { return plan.program.exposures[i]; }
   /// An exposure that the one before leads to directly.
@@ -30,6 +32,21 @@ struct Work {
     std::size_t i = plan.program.exposures.size() / 2;
     while (!plan.program.vias_before(i).empty()) ++i;
     return i;
+  }
+  ToolPose tool(std::size_t i) { return Kinematics(cell).tool_pose(exposure(i).joints); }
+  Eigen::Vector3d flange_O(std::size_t i) { return tool(i).focus_O - cell.arm.flange_to_focus_m * tool(i).beam_O; }
+  /// A triangle of 4 mm across a direction, of which planning knew nothing.
+  void add_screen(const Eigen::Vector3d& across_O, const Eigen::Vector3d& center_O) {
+    const Eigen::Vector3d u = .004 * across_O.unitOrthogonal(), v = across_O.cross(u);
+    const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {center_O + u, center_O - u + v, center_O - u - v});
+    mesh.triangles.push_back({n, n + 1, n + 2});
+  }
+  void add_via(std::size_t i, const Joints& joints) {
+    const auto before = static_cast<std::uint32_t>(i);
+    const auto at = std::lower_bound(plan.program.vias.begin(), plan.program.vias.end(), before,
+                                     [](const Via& a, std::uint32_t b) { return a.before_exposure < b; });
+    plan.program.vias.insert(at, {before, joints});
   }
   /// Exposes dot `i` with another yaw and the same table, whether that is allowed or not.
   void turn_yaw(std::size_t i, double angle) {
@@ -40,13 +57,14 @@ struct Work {
     ASSERT_TRUE(
         kinematics.solve_arm(table.to_W(exposure(i).position_O), kinematics.yaw(joints) + angle, elbow, joints));
   }
-  void flip_elbow(std::size_t i) {
+  void flip_elbow(std::size_t i) { flip_elbow(i, exposure(i).joints); }
+  void flip_elbow(std::size_t i, Joints& joints) const {
     const Kinematics kinematics(cell);
-    Joints& joints = exposure(i).joints;
     const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
     const Elbow other = joints[kJ2] > 0 ? Elbow::kNegative : Elbow::kPositive;
     const double j4 = joints[kJ4];
-    ASSERT_TRUE(kinematics.solve_arm(table.to_W(exposure(i).position_O), kinematics.yaw(joints), other, joints));
+    ASSERT_TRUE(
+        kinematics.solve_arm(table.to_W(plan.program.exposures[i].position_O), kinematics.yaw(joints), other, joints));
     joints[kJ4] = kinematics.wind(kJ4, joints[kJ4], j4);
   }
 };
@@ -129,6 +147,14 @@ const Spoiling kSpoilings[] = {
        w.exposure(kVictim).power_w *= 2;
      }},
     {"ElbowFlips", "elbow flips", [](Work& w) { w.flip_elbow(w.direct_one()); }},
+    {"ElbowFlipsToAWayPoint", "elbow flips",
+     [](Work& w) {
+       // A way-point in between is no retract.
+       const std::size_t i = w.direct_one();
+       Joints there = w.exposure(i - 1).joints;
+       w.flip_elbow(i - 1, there);
+       w.add_via(i, there);
+     }},
     {"J4Winds", "without a retract",
      [](Work& w) {
        const std::size_t i = w.direct_one();
@@ -139,19 +165,17 @@ const Spoiling kSpoilings[] = {
      [](Work& w) { w.exposure(w.direct_one()).joints[kRotation] += 2 * std::numbers::pi; }},
     {"ViaThroughTheObject", "touches",
      [](Work& w) {
-       // A way-point that puts the focus 60 mm beyond the dot, so that the lens is where the dot is.
+       // A way-point that puts the focus 75 mm beyond the dot, so that the lens reaches into the ball.
        const Kinematics kinematics(w.cell);
        const std::size_t i = w.direct_one();
        Via via{static_cast<std::uint32_t>(i), w.exposure(i).joints};
        const TablePose table = kinematics.table_pose(via.joints[kTilt], via.joints[kRotation]);
        const double yaw = kinematics.yaw(via.joints);
-       const Eigen::Vector3d focus_W = table.to_W(w.exposure(i).position_O) + .06 * kinematics.beam_W(yaw);
+       const Eigen::Vector3d focus_W = table.to_W(w.exposure(i).position_O) + .075 * kinematics.beam_W(yaw);
        const Elbow elbow = via.joints[kJ2] > 0 ? Elbow::kPositive : Elbow::kNegative;
        ASSERT_TRUE(kinematics.solve_arm(focus_W, yaw, elbow, via.joints));
        via.joints[kJ3] = std::max(via.joints[kJ3], 0.);
-       const auto at = std::lower_bound(w.plan.program.vias.begin(), w.plan.program.vias.end(), via.before_exposure,
-                                        [](const Via& a, std::uint32_t b) { return a.before_exposure < b; });
-       w.plan.program.vias.insert(at, via);
+       w.add_via(i, via.joints);
      }},
     {"RetractsRemoved", "on the way there",
      [](Work& w) {
@@ -169,21 +193,37 @@ const Spoiling kSpoilings[] = {
        std::swap(w.plan.program.exposures[a],
                  w.plan.program.exposures[b + 1 < w.plan.program.exposures.size() ? b + 1 : b - 1]);
      }},
-    {"AnotherMesh", "before the dot",
+    {"ScreenInTheBeam", "before the dot",
      [](Work& w) {
-       // A screen of 4 mm in one dot's beam, 20 mm before it.
-       const Eigen::Vector3d beam_O = Kinematics(w.cell).tool_pose(w.exposure(kVictim).joints).beam_O;
-       const Eigen::Vector3d center = w.exposure(kVictim).position_O - .02 * beam_O;
-       const Eigen::Vector3d u = .004 * beam_O.unitOrthogonal(), v = beam_O.cross(u);
-       const auto n = static_cast<std::uint32_t>(w.mesh.vertices.size());
-       w.mesh.vertices.insert(w.mesh.vertices.end(), {center + u, center - u + v, center - u - v});
-       w.mesh.triangles.push_back({n, n + 1, n + 2});
+       w.add_screen(w.tool(kVictim).beam_O, w.exposure(kVictim).position_O - .02 * w.tool(kVictim).beam_O);
      }},
     {"SmallerMesh", "misses the object",
      [](Work& w) {
        for (auto& p : w.mesh.vertices) p *= .5;
      }},
     {"FartherCell", "off the dot", [](Work& w) { w.cell.table.tilt_axis_W.x() += 1e-6; }},
+    {"OtherModel", "another model", [](Work& w) { w.plan.program.provenance.model_sha256 = "other"; }},
+    {"OtherSettings", "another job's settings", [](Work& w) { w.made_from.settings_sha256 = "other"; }},
+    {"OtherCell", "another cell", [](Work& w) { w.plan.program.provenance.cell_sha256.clear(); }},
+    {"OtherVersion", "another version", [](Work& w) { w.plan.program.provenance.version = "0"; }},
+    {"ExposuresSwapped", "without a retract",
+     [](Work& w) {
+       // Each is fine by itself; the ways between them are not.
+       auto& exposures = w.plan.program.exposures;
+       for (std::size_t i = 0; i < exposures.size() / 2; i += 2)
+         std::swap(exposures[i], exposures[exposures.size() - 1 - i]);
+     }},
+    {"LowerForearm", "arm touches", [](Work& w) { w.cell.arm.fore_link.height_m = .23; }},
+    {"LowerUpperArm", "the upper arm touches",
+     [](Work& w) { w.cell.arm.upper_link = {.height_m = .15, .radius_m = .2}; }},
+    {"ScreenInTheQuill", "the quill touches",
+     [](Work& w) { w.add_screen(w.tool(kVictim).up_O, w.flange_O(kVictim) + .05 * w.tool(kVictim).up_O); }},
+    {"WiderPlate", "the table",
+     [](Work& w) {
+       w.cell.table.plate_radius_m = .2;
+       w.cell.table.plate_thickness_m = .001;
+     }},
+    {"ThickerPost", "the table blocks the beam", [](Work& w) { w.cell.fixture.post_radius_m = .019; }},
     {"FatterLens", "lens body", [](Work& w) { w.cell.lens.radius_m = .05; }},
 };
 

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "planner/plan.h"
+#include "tests/planner/pose_grid.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
@@ -102,6 +104,49 @@ TEST(Reach, AThickLensTouchesTheObject) {
   EXPECT_NE(skipped.detail.find("lens body"), std::string::npos) << skipped.detail;
 }
 
+TEST(Reach, ALowForearmTouchesTheObject) {
+  CellDescription cell = default_cell();
+  cell.arm.fore_link.height_m = .2;  // in the middle of the object
+  const Reach reach(small_cup(), cell, {});
+  SkippedDot skipped;
+  EXPECT_FALSE(reach.is_reachable({.0, 0, .025}, {0, 0, 1}, &skipped));
+  EXPECT_EQ(skipped.reason, SkipReason::kArm) << skipped.detail;
+  EXPECT_NE(skipped.detail.find("an arm link would touch the"), std::string::npos) << skipped.detail;
+  EXPECT_GT(skipped.amount, 0);
+}
+
+/// The egg-cup shapes, whatever is out of reach, and every reason there is.
+TEST(Reach, WhatIsSkippedIsOutOfReachOfAFineGridOfPoses) {
+  struct Case {
+    const char* name;
+    TexturedMesh mesh;
+    std::function<void(CellDescription&)> change;
+  };
+  const Case cases[] = {
+      {"cup on no post", small_cup(), [](CellDescription& c) { c.fixture.post_height_m = 0; }},
+      {"drilled block", drilled_block(), [](CellDescription&) {}},
+      {"short tilt", ball(.02), [](CellDescription& c) { c.axes[kTilt].max = .5; }},
+      {"narrow elbow", ball(.02), [](CellDescription& c) { c.axes[kJ2].min = 1.9, c.axes[kJ2].max = 2.2; }},
+      {"low forearm", ball(.02), [](CellDescription& c) { c.arm.fore_link.height_m = .24; }},
+      {"thick lens", drilled_block(), [](CellDescription& c) { c.lens.near_m = .02; }}};
+  constexpr std::size_t kLooks = 12;
+  for (const Case& one : cases) {
+    CellDescription cell = default_cell();
+    one.change(cell);
+    const Reach::Implementation reach(one.mesh, cell, {});
+    std::vector<Target> skipped;
+    for (const Dot& dot : scatter(one.mesh, 2e-3).dots) {
+      const Vector3d normal = dot.normal_O.cast<double>().normalized();
+      if (!reach.find_pose({dot.position_O, normal, normal}, {})) skipped.push_back({dot.position_O, normal, normal});
+    }
+    EXPECT_FALSE(skipped.empty()) << one.name;
+    const std::size_t stride = std::max<std::size_t>(1, skipped.size() / kLooks);
+    for (std::size_t i = 0; i < skipped.size(); i += stride)
+      EXPECT_FALSE(search_pose_grid(reach, skipped[i], 4 * std::numbers::pi / 180).is_reached)
+          << one.name << ": " << skipped[i].position_O.transpose();
+  }
+}
+
 TEST(Reach, FoundPosesAreWithinTheConeAndTheLimits) {
   const CellDescription cell = default_cell();
   const TexturedMesh mesh = small_cup();
@@ -136,23 +181,6 @@ TEST(ObjectDistance, IsTheDistanceToABall) {
     const double facets_m = radius_m * (1 - std::cos(std::numbers::pi / 24));  // the ball is a polyhedron
     EXPECT_LE(distance(p), std::min(range_m, expected_m + facets_m) + distance.error_m(expected_m)) << p.transpose();
     EXPECT_GE(distance(p), std::min(range_m, expected_m) - 5e-4) << p.transpose();
-  }
-}
-
-TEST(Clearance, SlackIsALowerBoundOnTheWayToTouching) {
-  const CellDescription cell = default_cell();
-  const Clearance clearance(ball(.02), cell);
-  // The beam straight down on the ball's top; the lens is lowered until it touches.
-  const Vector3d beam_O(0, 0, -1), up_O = Vector3d(1, 0, 1).normalized();
-  EXPECT_GT(clearance.slack_m({{0, 0, .04}, beam_O, up_O}), .02);
-  for (double z = .04; z > -.03; z -= .001) {
-    const double gap_m =
-        z + cell.lens.near_m - .04;  // the lens's end is 60 mm above the focus, the ball's top at 40 mm
-    const double slack_m = clearance.slack_m({{0, 0, z}, beam_O, up_O});
-    EXPECT_LE(slack_m, std::max(0., gap_m) + 1e-4) << z;
-    if (gap_m > .005) {
-      EXPECT_GE(slack_m, std::min(.02, gap_m - .0125)) << z;
-    }
   }
 }
 
