@@ -302,6 +302,31 @@ TEST(CellFile, WarningsNameWhatIsAllowedButOdd) {
   EXPECT_EQ(warnings("/lens/near_mm", 10).size(), 1u);
 }
 
+TEST(CellFile, LinksRunAboveTheLensUnlessTheFileSaysWhere) {
+  Json json = Json::parse(default_text());
+  CellDescription cell = cell_from_json(json.dump(), "");
+  const double lens_top_m = .04 * std::sin(45 * kDegree) + .015 * std::cos(45 * kDegree);
+  EXPECT_EQ(cell.arm.fore_link.radius_m, .035);
+  EXPECT_NEAR(cell.arm.fore_link.height_m, .3 + lens_top_m + .03 + .035, 1e-12);
+  EXPECT_EQ(cell.arm.upper_link.height_m, cell.arm.fore_link.height_m);
+  EXPECT_EQ(cell.arm.quill_length_m, cell.arm.fore_link.height_m);
+  EXPECT_TRUE(cell_warnings(cell).empty());
+
+  json["arm"]["forearm_height_mm"] = 250;
+  json["arm"]["forearm_radius_mm"] = 20;
+  json["arm"]["upper_arm_height_mm"] = 320;
+  json["arm"]["quill_length_mm"] = 280;
+  cell = cell_from_json(json.dump(), "");
+  EXPECT_DOUBLE_EQ(cell.arm.fore_link.height_m, .25);
+  EXPECT_DOUBLE_EQ(cell.arm.upper_link.radius_m, .02);
+  EXPECT_DOUBLE_EQ(cell.arm.upper_link.height_m, .32);
+  EXPECT_DOUBLE_EQ(cell.arm.quill_length_m, .28);
+  ASSERT_EQ(cell_warnings(cell).size(), 1u);
+  EXPECT_TRUE(cell_warnings(cell)[0].starts_with("$.arm.forearm_height_mm"));
+  json["arm"]["forearm_radius_mm"] = -1;
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.arm.forearm_radius_mm");
+}
+
 TEST(CellFile, CellsAreFoundByNameOrPath) {
   EXPECT_EQ(find_cell("default"), shipped("default"));
   EXPECT_EQ(find_cell(shipped("default").string()), shipped("default"));
