@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
+#include <span>
+#include <utility>
 
+#include "daemon/program_limits.h"
 #include "drivers/driver_error.h"
 #include "planner/time_model.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kJointTolerance = 1e-9;  ///< rad or m: what arithmetic may put outside a limit
 constexpr double kGraceS = 5;         ///< how much later than the time model a move may end before it counts as lost
 constexpr double kPulseGraceS = 0.1;  ///< the same for a pulse
 
@@ -20,25 +21,39 @@ struct RunEnded {
   ExecutionOutcome outcome;
 };
 
-/// The program asks for something outside the limits: no device is to blame.
-struct ProgramRefused : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-std::string millimetres_or_degrees(int axis, double value) {
-  const bool is_prismatic = axis == kJ3;
-  const double figure = is_prismatic ? value * 1e3 : value * 180 / 3.14159265358979323846;
-  std::string text = std::to_string(std::round(figure * 1e3) / 1e3);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (!text.empty() && text.back() == '.') text.pop_back();
-  return text + (is_prismatic ? " mm" : " degrees");
-}
+/// How far the measured positions may be from a target that a device says it has reached: catches an answer that is
+/// about an earlier move. Devices judge by far smaller windows of their own.
+constexpr double kPositionWindow = 3.5e-4;  ///< rad, 0.02 degrees
+constexpr double kPrismaticWindow = 2e-5;   ///< m
 
 Robot::Positions robot_part(const Joints& joints) {
   return {joints[kJ1], joints[kJ2], joints[kJ3], joints[kJ4]};
 }
 Table::Positions table_part(const Joints& joints) {
   return {joints[kTilt], joints[kRotation]};
+}
+template <std::size_t N>
+typename AxisGroup<N>::Positions chain_part(const Joints& joints) {
+  if constexpr (N == 4)
+    return robot_part(joints);
+  else
+    return table_part(joints);
+}
+
+template <std::size_t N>
+bool is_near(const std::array<double, N>& measured, const std::array<double, N>& target) {
+  for (std::size_t i = 0; i < N; ++i)
+    if (!(std::abs(measured[i] - target[i]) <= (N == 4 && i == kJ3 ? kPrismaticWindow : kPositionWindow))) return false;
+  return true;
+}
+
+/// @throws DriverError unless the chain moves or may move.
+template <class Status>
+void check_under_way(const char* chain, const Status& status) {
+  if (status.state == DeviceState::kReady || status.state == DeviceState::kMoving) return;
+  if (status.state == DeviceState::kFault)
+    throw DriverError(std::string("the ") + chain + " reports a fault: " + status.fault);
+  throw DriverError(std::string("the ") + chain + " is no longer ready but " + device_state_name(status.state));
 }
 
 /// One run of a program. Devices are touched by this class and request_stop() only.
@@ -51,21 +66,35 @@ class Run {
   void travel_all(const std::vector<Joints>& way);
   void expose_all(const std::vector<Joints>& approach, const ExecutionProgress& progress);
   std::size_t exposed() const { return exposed_; }
+  const DurationHistogram& own_time() const { return own_time_; }
 
  private:
+  enum class Rest { kPassing, kSettled };
+  /// What is sent for one or more way-points at once.
+  struct Leg {
+    std::span<const Joints> way;
+    bool moves_robot = false, moves_table = false;
+    double travel_s = 0;
+    double settle_s = 0;  ///< at its end, if it ends in an exposure
+  };
+
   void check_axes_ready();
   void check_laser_ready();
-  void check_pose(const Joints& target, std::size_t exposure) const;
-  void check_pulse(const Exposure& exposure, std::size_t i) const;
   void prove_laser_off();
   void end_if_asked() const;
-  enum class Rest { kPassing, kSettled };
-  void move(const Joints& target, Rest rest);
+  void end_if_asked_or_paused() const;
+  std::span<const Via> vias_of(std::size_t i);
+  void follow(std::span<const Joints> way, Rest rest);
+  Leg plan_leg(std::span<const Joints> way, Rest rest, double now_s) const;
+  std::size_t way_points_at_once(std::span<const Joints> way) const;
+  void move(const Leg& leg, Rest rest);
+  template <std::size_t N>
+  void send(AxisGroup<N>& chain, const Leg& leg, double settle_s);
   void wait_in_position(double deadline_s);
-  void visit_approach(const std::vector<Joints>& approach);
-  void visit_vias(std::size_t i);
   void expose(std::size_t i);
-  void wait_pulse_end(const Exposure& exposure);
+  void prepare_next(std::size_t i);
+  void wait_pulse_end(double fired_s, const Exposure& exposure);
+  void count_own_time() { own_s_ += cell_.clock.now_s() - idle_since_s_; }
 
   const ExposureProgram& program_;
   const Cell& cell_;
@@ -77,29 +106,56 @@ class Run {
   Joints at_{};                                   ///< where the last finished move ended
   std::optional<Robot::Positions> robot_target_;  ///< what each chain was last told in this run
   std::optional<Table::Positions> table_target_;
-  double rung_down_s_ = 0;  ///< when what was passed without settling will be at rest, on the cell's clock
+  double rung_down_s_ = 0;       ///< when what was passed without settling will be at rest, on the cell's clock
+  bool is_dark_proved_ = false;  ///< since the last pulse
+  std::vector<Joints> way_;        ///< to the exposure under way
+  std::size_t next_exposure_ = 0;  ///< that exposure
   std::size_t next_via_ = 0;
   std::size_t exposed_ = 0;
+  DurationHistogram own_time_;
+  double idle_since_s_ = 0;  ///< the devices have nothing to do since then: our time
+  double own_s_ = 0;         ///< of it, for the exposure under way
 };
 
 void Run::end_if_asked() const {
   if (control_.stop.load()) throw RunEnded{ExecutionOutcome::kStopped};
 }
 
+void Run::end_if_asked_or_paused() const {
+  end_if_asked();
+  if (control_.pause.load()) throw RunEnded{ExecutionOutcome::kPaused};
+}
+
+/// One exchange with the device after each pulse, and at the beginning; what has been proved stays so until the next
+/// pulse is asked for, by nobody but this class. The last frame is looked at every time: that costs nothing.
 void Run::prove_laser_off() {
-  if (!cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
+  if (!is_dark_proved_ && !cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
+  is_dark_proved_ = true;
+  if (!cell_.laser.status().is_emitting) return;
+  is_dark_proved_ = false;
+  throw DriverError("the laser emits although it was turned off");
 }
 
 void Run::check_axes_ready() {
   prove_laser_off();
-  const auto robot = cell_.robot.status();
-  const auto table = cell_.table.status();
+  // After a stop the axes may still be braking.
+  const double deadline_s = cell_.clock.now_s() + kGraceS;
+  auto robot = cell_.robot.status();
+  auto table = cell_.table.status();
+  while ((robot.state == DeviceState::kMoving || table.state == DeviceState::kMoving) &&
+         cell_.clock.now_s() < deadline_s) {
+    end_if_asked();
+    cell_.clock.sleep_until(cell_.clock.now_s() + description_.timing.tick_s);
+    robot = cell_.robot.status();
+    table = cell_.table.status();
+  }
   if (robot.state != DeviceState::kReady)
     throw DriverError(std::string("the robot is not ready but ") + device_state_name(robot.state));
   if (table.state != DeviceState::kReady)
     throw DriverError(std::string("the table is not ready but ") + device_state_name(table.state));
   std::copy(robot.positions.begin(), robot.positions.end(), at_.begin());
   std::copy(table.positions.begin(), table.positions.end(), at_.begin() + kTilt);
+  idle_since_s_ = cell_.clock.now_s();
 }
 
 void Run::check_laser_ready() {
@@ -110,58 +166,82 @@ void Run::check_laser_ready() {
                       (laser.fault.empty() ? "" : ": " + laser.fault));
 }
 
-/// Whatever the planner said: outside the cell's limits nothing moves. The comparisons are written so that NaN fails
-/// them.
-void Run::check_pose(const Joints& target, std::size_t exposure) const {
-  for (int axis = 0; axis < kAxisCount; ++axis) {
-    const auto& limits = description_.axes[static_cast<std::size_t>(axis)];
-    const double value = target[static_cast<std::size_t>(axis)];
-    if (value >= limits.min - kJointTolerance && value <= limits.max + kJointTolerance) continue;
-    throw ProgramRefused("the program asks axis " + std::string(kAxisNames[static_cast<std::size_t>(axis)]) + " for " +
-                         millimetres_or_degrees(axis, value) + " at exposure " + std::to_string(exposure) +
-                         ", outside its limits " + millimetres_or_degrees(axis, limits.min) + " to " +
-                         millimetres_or_degrees(axis, limits.max));
+/// Both chains start together at each way-point, because that is how the way was checked. Where only one of them moves,
+/// a device that can buffer gets several way-points at once.
+std::size_t Run::way_points_at_once(std::span<const Joints> way) const {
+  const bool moves_robot = robot_target_ != robot_part(way[0]);
+  const bool moves_table = table_target_ != table_part(way[0]);
+  if (moves_robot == moves_table) return 1;
+  const std::size_t most =
+      std::min(way.size(), 1 + (moves_robot ? cell_.robot.look_ahead() : cell_.table.look_ahead()));
+  const auto other_rests = [&](std::size_t i) {
+    return moves_robot ? table_part(way[i]) == table_part(way[i - 1]) : robot_part(way[i]) == robot_part(way[i - 1]);
+  };
+  std::size_t count = 1;
+  while (count < most && other_rests(count)) ++count;
+  return count;
+}
+
+/// A chain that rests where it shall be isn't commanded again, but its in_position is required. Way-points are passed
+/// without waiting for the axes to ring down, so what is left of that is added to the settling of the move that ends in
+/// an exposure.
+Run::Leg Run::plan_leg(std::span<const Joints> way, Rest rest, double now_s) const {
+  Leg leg;
+  leg.way = way;
+  Joints from = at_;
+  double rung_down_s = rung_down_s_;
+  for (const Joints& target : way) {
+    leg.travel_s += move_s(description_, from, target);
+    leg.settle_s = std::max(settle_s(description_, from, target), rung_down_s - (now_s + leg.travel_s));
+    rung_down_s = now_s + leg.travel_s + leg.settle_s;
+    from = target;
+  }
+  const bool must_ring_down = rest == Rest::kSettled && rung_down_s_ > now_s;
+  const auto moves = [&](const auto& told, auto part) {
+    return must_ring_down ||
+           std::any_of(way.begin(), way.end(), [&](const Joints& target) { return told != part(target); });
+  };
+  leg.moves_robot = moves(robot_target_, robot_part);
+  leg.moves_table = moves(table_target_, table_part);
+  return leg;
+}
+
+/// The chain that rests all the way is told once where it is, so that it settles.
+template <std::size_t N>
+void Run::send(AxisGroup<N>& chain, const Leg& leg, double settle_s) {
+  const auto part = [](const Joints& joints) { return chain_part<N>(joints); };
+  const bool rests = std::all_of(leg.way.begin(), leg.way.end(),
+                                 [&](const Joints& target) { return part(target) == part(leg.way.front()); });
+  const auto way = rests ? leg.way.last(1) : leg.way;
+  for (const Joints& target : way) chain.move_to(part(target), &target == &way.back() ? settle_s : 0);
+}
+
+void Run::move(const Leg& leg, Rest rest) {
+  end_if_asked();
+  prove_laser_off();
+  const double settle = rest == Rest::kSettled ? leg.settle_s : 0;
+  robot_target_ = robot_part(leg.way.back());
+  table_target_ = table_part(leg.way.back());
+  count_own_time();
+  const double now_s = cell_.clock.now_s();
+  if (leg.moves_robot) send(cell_.robot, leg, settle);
+  if (leg.moves_table) send(cell_.table, leg, settle);
+  at_ = leg.way.back();
+  if (rest == Rest::kSettled) journal_.expect(next_exposure_);
+  wait_in_position(now_s + 2 * leg.travel_s + settle + kGraceS);
+  rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + leg.settle_s;
+}
+
+void Run::follow(std::span<const Joints> way, Rest rest) {
+  while (!way.empty()) {
+    const auto count = way_points_at_once(way);
+    const Rest at_end = count == way.size() ? rest : Rest::kPassing;
+    move(plan_leg(way.first(count), at_end, cell_.clock.now_s()), at_end);
+    way = way.subspan(count);
   }
 }
 
-void Run::check_pulse(const Exposure& exposure, std::size_t i) const {
-  constexpr double kRelative = 1e-6;  // program files keep floats
-  const double power = exposure.power_w, pulse = exposure.pulse_s;
-  const auto within = [](double value, double low, double high) {
-    return value >= low * (1 - kRelative) && value <= high * (1 + kRelative);
-  };
-  if (!within(power, laser_limits_.power_min_w, laser_limits_.power_max_w))
-    throw ProgramRefused("exposure " + std::to_string(i) + " asks for " + std::to_string(power) +
-                         " W, outside the laser's limits");
-  if (!within(pulse, laser_limits_.pulse_min_s, laser_limits_.pulse_max_s))
-    throw ProgramRefused("exposure " + std::to_string(i) + " asks for a pulse of " + std::to_string(pulse) +
-                         " s, outside the laser's limits");
-}
-
-/// Both chains start together. A chain that rests where it shall be isn't commanded again, but its in_position is
-/// required. Way-points are passed without waiting for the axes to ring down, so what is left of that is added to the
-/// settling of the move that ends in an exposure.
-void Run::move(const Joints& target, Rest rest) {
-  end_if_asked();
-  prove_laser_off();
-  const double now_s = cell_.clock.now_s();
-  const double travel_s = move_s(description_, at_, target);
-  const double ring_s = std::max(settle_s(description_, at_, target), rung_down_s_ - (now_s + travel_s));
-  const double settle = rest == Rest::kSettled ? ring_s : 0;
-  const auto robot_target = robot_part(target);
-  const auto table_target = table_part(target);
-  const bool is_ringing = rung_down_s_ > now_s;
-  const bool moves_robot = is_ringing || robot_target_ != robot_target;
-  const bool moves_table = is_ringing || table_target_ != table_target;
-  robot_target_ = robot_target;
-  table_target_ = table_target;
-  if (moves_robot) cell_.robot.move_to(robot_target, settle);
-  if (moves_table) cell_.table.move_to(table_target, settle);
-  wait_in_position(now_s + 2 * travel_s + settle + kGraceS);
-  rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + ring_s;
-  at_ = target;
-}
-
+/// Woken by devices that learn by themselves of an arrival or a fault, else when the devices expect to arrive.
 void Run::wait_in_position(double deadline_s) {
   for (;;) {
     const double arrival_s = std::max(cell_.robot.expected_arrival_s(), cell_.table.expected_arrival_s());
@@ -171,62 +251,88 @@ void Run::wait_in_position(double deadline_s) {
     end_if_asked();
     const auto robot = cell_.robot.status();
     const auto table = cell_.table.status();
-    if (robot.state == DeviceState::kFault) throw DriverError("the robot reports a fault: " + robot.fault);
-    if (table.state == DeviceState::kFault) throw DriverError("the table reports a fault: " + table.fault);
-    if (robot.in_position && table.in_position) return;
+    check_under_way("robot", robot);
+    check_under_way("table", table);
+    if (cell_.laser.status().is_emitting) throw DriverError("the laser emits while the axes move");
+    const bool is_robot_there = robot.in_position && is_near(robot.positions, *robot_target_);
+    const bool is_table_there = table.in_position && is_near(table.positions, *table_target_);
     const double now_s = cell_.clock.now_s();
-    if (now_s >= deadline_s)
-      throw DriverError(std::string("the ") + (robot.in_position ? "table" : "robot") +
-                        " is not in position long after its move should have ended");
+    if (is_robot_there && is_table_there) {
+      const double known_s = std::max(robot.in_position_since_s, table.in_position_since_s);
+      const bool is_known = robot.in_position_since_s > 0 && table.in_position_since_s > 0 && known_s <= now_s;
+      idle_since_s_ = is_known ? std::max(known_s, idle_since_s_) : now_s;
+      return;
+    }
+    if (now_s >= deadline_s) {
+      const bool is_stray = is_robot_there ? table.in_position : robot.in_position;
+      throw DriverError(std::string("the ") + (is_robot_there ? "table" : "robot") +
+                        (is_stray ? " says that it is in position but stands elsewhere"
+                                  : " is not in position long after its move should have ended"));
+    }
     if (arrival_s <= now_s) cell_.clock.sleep_until(now_s + description_.timing.tick_s);
   }
 }
 
 void Run::travel_all(const std::vector<Joints>& way) {
   check_axes_ready();
-  visit_approach(way);
+  for (const Joints& target : way) check_pose(description_, target, 0);
+  follow(way, Rest::kPassing);
 }
 
-void Run::visit_approach(const std::vector<Joints>& approach) {
-  for (const Joints& via : approach) {
-    check_pose(via, 0);
-    move(via, Rest::kPassing);
-  }
-}
-
-void Run::visit_vias(std::size_t i) {
-  for (; next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= i; ++next_via_) {
-    check_pose(program_.vias[next_via_].joints, i);
-    move(program_.vias[next_via_].joints, Rest::kPassing);
-  }
+/// The way-points before exposure i that have not been passed yet.
+std::span<const Via> Run::vias_of(std::size_t i) {
+  const std::size_t first = next_via_;
+  while (next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= i) ++next_via_;
+  return std::span(program_.vias).subspan(first, next_via_ - first);
 }
 
 /// The pulse's length is the device's business; here is only waited for its end.
-void Run::wait_pulse_end(const Exposure& exposure) {
+void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
   const double end_s = cell_.clock.now_s() + exposure.pulse_s;
   const double deadline_s = end_s + kPulseGraceS;
   while (!control_.stop.load()) {
+    const auto laser = cell_.laser.status();
     const double now_s = cell_.clock.now_s();
-    if (now_s < end_s) {
-      cell_.clock.sleep_until(end_s);
-      continue;
+    const bool is_seen_over = laser.dark_since_s > fired_s;
+    if (!laser.is_emitting && (is_seen_over || now_s >= end_s)) {
+      idle_since_s_ = is_seen_over ? std::min(laser.dark_since_s, now_s) : now_s;
+      return;
     }
-    if (!cell_.laser.status().is_emitting) return;
     if (now_s >= deadline_s) throw DriverError("the laser still emits long after its pulse should have ended");
-    cell_.clock.sleep_until(now_s + description_.timing.tick_s);
+    cell_.clock.sleep_until(now_s < end_s ? end_s : now_s + description_.timing.tick_s);
+  }
+}
+
+/// While the pulse is on nothing moves, but what the next move needs can be on its way. Hints only: what is wrong with
+/// them the move itself will tell.
+void Run::prepare_next(std::size_t i) {
+  if (i + 1 >= program_.exposures.size() || journal_.state(i + 1) != ExposureState::kRemaining) return;
+  const bool has_via = next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= i + 1;
+  const Joints& target = has_via ? program_.vias[next_via_].joints : program_.exposures[i + 1].joints;
+  if (!is_within_limits(description_, target)) return;
+  const Leg leg = plan_leg({&target, 1}, has_via ? Rest::kPassing : Rest::kSettled, cell_.clock.now_s());
+  const double settle = has_via ? 0 : leg.settle_s;
+  try {
+    if (leg.moves_robot) cell_.robot.prepare(robot_part(target), settle);
+    if (leg.moves_table) cell_.table.prepare(table_part(target), settle);
+  } catch (const DriverError&) {  // the move that follows will meet the same device
   }
 }
 
 void Run::expose(std::size_t i) {
   const Exposure& exposure = program_.exposures[i];
   check_laser_ready();
-  end_if_asked();
-  if (control_.pause.load()) throw RunEnded{ExecutionOutcome::kPaused};
+  end_if_asked_or_paused();
 
   journal_.arm(i);
   try {
+    count_own_time();
+    own_time_.add(std::exchange(own_s_, 0));
+    is_dark_proved_ = false;
+    const double fired_s = cell_.clock.now_s();
     cell_.laser.fire(exposure.power_w, exposure.pulse_s);
-    wait_pulse_end(exposure);
+    prepare_next(i);
+    wait_pulse_end(fired_s, exposure);
     prove_laser_off();
     // Whoever cuts a pulse sets the flag before, so a flag that is still clear here means that the pulse was whole.
     end_if_asked();
@@ -252,25 +358,27 @@ void Run::expose_all(const std::vector<Joints>& approach, const ExecutionProgres
   std::size_t first = 0;
   while (first < count && journal_.state(first) != ExposureState::kRemaining) ++first;
   if (first == count) return;
-  while (next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= first) ++next_via_;
+  vias_of(first);  // passed over: the approach replaces them
 
   for (std::size_t i = first; i < count; ++i) {
-    end_if_asked();
-    if (control_.pause.load()) throw RunEnded{ExecutionOutcome::kPaused};
+    end_if_asked_or_paused();
     const bool is_exposed = journal_.state(i) == ExposureState::kRemaining;
-    const Joints& target = program_.exposures[i].joints;
-    check_pose(target, i);
-    if (is_exposed) check_pulse(program_.exposures[i], i);
-    if (i == first)
-      visit_approach(approach);
-    else
-      visit_vias(i);
-    move(target, is_exposed ? Rest::kSettled : Rest::kPassing);
+    if (is_exposed) check_pulse(laser_limits_, program_.exposures[i], i);
+    way_.clear();
+    if (i == first) way_ = approach;
+    for (const Via& via : vias_of(i)) way_.push_back(via.joints);
+    way_.push_back(program_.exposures[i].joints);
+    for (const Joints& target : way_) check_pose(description_, target, i);
+    next_exposure_ = i;
+    follow(way_, is_exposed ? Rest::kSettled : Rest::kPassing);
     if (!is_exposed) continue;
     expose(i);
     if (progress) progress(journal_.done_count());
   }
-  visit_vias(count);  // the way home
+  way_.clear();
+  for (const Via& via : vias_of(count)) way_.push_back(via.joints);
+  for (const Joints& target : way_) check_pose(description_, target, count);
+  follow(way_, Rest::kPassing);  // the way home
 }
 
 /// The laser first, then motion; both, whatever the other answers.
@@ -301,6 +409,10 @@ ExecutionResult run_guarded(const Cell& cell, const ExecutionControl& control, W
     // A device that refuses because it was just stopped is no fault.
     result.outcome = control.stop.load() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed;
     result.reason = error.what();
+  } catch (...) {
+    make_safe(cell);
+    result.outcome = ExecutionOutcome::kFailed;
+    result.reason = "something that is no exception escaped";
   }
   if (result.outcome == ExecutionOutcome::kStopped) result.reason = "the cell was stopped";
   result.elapsed_s = cell.clock.now_s() - begin_s;
@@ -319,6 +431,7 @@ ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints
     run.expose_all(approach, progress);
   });
   result.exposed = run.exposed();
+  result.own_time = run.own_time();
   return result;
 }
 

@@ -5,13 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "daemon/duration_histogram.h"
 #include "daemon/journal.h"
 #include "drivers/cell.h"
 #include "planner/exposure_program.h"
 
 /// Runs an exposure program on a cell: the only code that commands motion. One exposure: vias, move, in position and
-/// settled on both chains, journal armed, pulse, laser proved off, journal done. The laser is off before every move,
-/// and on every way out.
+/// settled on both chains (by their word and by their measured positions), journal armed, pulse, laser proved off,
+/// journal done. The laser is off before every move, and on every way out. Way-points are handed ahead to devices that
+/// can buffer them, pulses never; while a pulse is on, the next set-point is prepared but nothing moves; while the axes
+/// move, the journal's next window goes to disk.
 namespace hilbrush {
 
 /// How other threads reach a running executor; request_stop() sets `stop` and acts on the devices at once.
@@ -29,6 +32,10 @@ struct ExecutionResult {
       false;  ///< failed because the program asks for what the cell must not do; nothing is wrong with the cell
   double elapsed_s = 0;     ///< on the cell's clock
   std::size_t exposed = 0;  ///< in this run
+  /// What this program adds to each dot on the cell's clock: from when the devices are seen in position to the call
+  /// that fires, and from when the pulse is seen over to the call that moves. Devices that say since when are taken at
+  /// their word.
+  DurationHistogram own_time{};
 };
 
 using ExecutionProgress = std::function<void(std::size_t exposures_done)>;

@@ -4,13 +4,16 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
+#include <systemd/sd-daemon.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cstdint>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <string>
 
 #include "daemon/server/daemon.h"
 #include "sampling/check.h"
@@ -63,8 +66,13 @@ int serve(const DaemonOptions& options) {
   Daemon daemon(options);
   g_daemon.store(&daemon);
   if (!daemon.notice().empty()) spdlog::warn("{}", daemon.notice());
-  daemon.end_on_signals();
-  spdlog::info("hilbrushd {} listens on {}; the cell is stopped", HILBRUSH_VERSION, options.socket.string());
+  daemon.end_on_signals([] { ::sd_notify(0, "STOPPING=1"); });
+  // The watchdog is fed from the thread that serves requests: a daemon that can't be told to stop is ended.
+  if (std::uint64_t period_us = 0; ::sd_watchdog_enabled(0, &period_us) > 0)
+    daemon.every(static_cast<double>(period_us) / 2e6, [] { ::sd_notify(0, "WATCHDOG=1"); });
+  const std::string tcp = daemon.tcp_address().empty() ? "" : " and " + daemon.tcp_address();
+  spdlog::info("hilbrushd {} listens on {}{}; the cell is stopped", HILBRUSH_VERSION, options.socket.string(), tcp);
+  ::sd_notify(0, "READY=1");
   daemon.run();
   darken();
   spdlog::info("hilbrushd ends; the laser is off");
@@ -81,9 +89,10 @@ int main(int argc, char** argv) {
   options.socket = "/run/hilbrush/hilbrush.sock";
   options.state = "/var/lib/hilbrush";
   options.pipeline = pipeline_beside_me();
-  std::string level = "info";
+  std::string level = "info", settings;
   app.add_option("--socket", options.socket, "Unix socket to listen on (mode 0660)")->capture_default_str();
   app.add_option("--state", options.state, "folder for jobs, their files and the audit log")->capture_default_str();
+  app.add_option("--settings", settings, "JSON file: who may connect, TCP (default: the socket's group may, no TCP)");
   app.add_option("--cell", options.cell, "cell file, or name of a shipped cell")->capture_default_str();
   app.add_option(
       "--time-scale", options.time_scale,
@@ -108,8 +117,10 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("hilbrushd"));
   spdlog::set_level(spdlog::level::from_str(level));
   ::signal(SIGPIPE, SIG_IGN);
+  ::signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write, and no end of the daemon
   raise_descriptor_limit();
   try {
+    if (!settings.empty()) options.settings = hilbrush::load_daemon_settings(settings);
     return serve(options);
   } catch (const hilbrush::InputError& error) {
     spdlog::error("{}", error.what());

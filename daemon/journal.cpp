@@ -1,14 +1,6 @@
 #include "daemon/journal.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
-#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -23,22 +15,27 @@ namespace {
 
 constexpr std::size_t kPage = 4096;
 constexpr char kMagic[8] = {'H', 'B', 'J', 'O', 'U', 'R', 'N', '\n'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kCountMax = std::size_t{1} << 32;  ///< dot indices are 32 bits wide
 constexpr std::size_t kNoWindow = std::numeric_limits<std::size_t>::max();
 
-/// Native byte order: a journal never leaves its machine, and a foreign one fails its checksum.
+/// Written once, when the journal is made. Native byte order: a journal never leaves its machine, and a foreign one
+/// fails its checksum.
 struct Header {
   char magic[8];
   std::uint32_t version;
   std::uint32_t window;
   std::uint64_t count;
   char program_sha256[64];
-  char boot_id[64];
   std::uint64_t checksum;
 };
-static_assert(sizeof(Header) <= kPage);
-static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+/// In a page of its own, written at each opening: torn, it counts as another boot's.
+struct Boot {
+  char id[64];
+  std::uint64_t checksum;
+};
+constexpr std::size_t kBootPlace = kPage, kTables = 2 * kPage;
+static_assert(sizeof(Header) <= kPage && sizeof(Boot) <= kPage);
 
 /// splitmix64's finaliser: every input bit reaches every output bit.
 std::uint64_t mix(std::uint64_t x) {
@@ -64,10 +61,12 @@ constexpr std::uint64_t kExposureSeed = 0x65787073ull << 32;
 constexpr std::uint64_t kWindowSeed = 0x77696e64ull << 32;
 constexpr std::uint8_t kClosed = 0, kOpen = 1;
 
-std::uint64_t header_checksum(const Header& header) {
-  const auto* bytes = reinterpret_cast<const unsigned char*>(&header);
+/// Over everything before the checksum at its end.
+template <class Block>
+std::uint64_t block_checksum(const Block& block) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(&block);
   std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < offsetof(Header, checksum); ++i) sum = mix(sum ^ bytes[i]);
+  for (std::size_t i = 0; i < offsetof(Block, checksum); ++i) sum = mix(sum ^ bytes[i]);
   return sum;
 }
 
@@ -80,88 +79,51 @@ std::string field_text(std::span<const char> field) {
   return {field.data(), strnlen(field.data(), field.size())};
 }
 
-[[noreturn]] void fail(const std::filesystem::path& file, const std::string& sentence) {
-  throw std::runtime_error(file.string() + ": " + sentence);
-}
-[[noreturn]] void fail_errno(const std::filesystem::path& file, const std::string& what) {
-  fail(file, what + ": " + std::strerror(errno));
-}
-
 std::size_t window_count(std::size_t count) {
   return (count + Journal::kWindow - 1) / Journal::kWindow;
 }
 std::size_t round_up(std::size_t bytes) {
   return (bytes + kPage - 1) / kPage * kPage;
 }
-std::size_t window_table_bytes(std::size_t count) {
-  return round_up(window_count(count) * sizeof(std::uint64_t));
+std::size_t records_place(std::size_t count) {
+  return kTables + round_up(window_count(count) * sizeof(std::uint64_t));
 }
-std::size_t file_bytes(std::size_t count) {
-  return kPage + window_table_bytes(count) + round_up(count * sizeof(std::uint64_t));
-}
-
-/// A process that was forked a moment ago shares our locks until it executes its program or dies: a lock is given a
-/// second to become free.
-bool lock_exclusively(int fd) {
-  for (int attempt = 0; attempt < 100; ++attempt) {
-    if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return true;
-    if (errno != EWOULDBLOCK && errno != EINTR) return false;
-    ::usleep(10000);
-  }
-  return false;
+std::size_t storage_bytes(std::size_t count) {
+  return records_place(count) + round_up(count * sizeof(std::uint64_t));
 }
 
-void sync_folder(const std::filesystem::path& file) {
-  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) fail_errno(folder, "can't be opened");
-  const int result = ::fsync(fd);
-  ::close(fd);
-  if (result != 0) fail_errno(folder, "can't be synced");
+template <class Block>
+std::span<std::uint8_t> bytes_of(Block& block) {
+  return {reinterpret_cast<std::uint8_t*>(&block), sizeof block};
+}
+std::span<std::uint8_t> bytes_of(std::vector<std::uint64_t>& table) {
+  return {reinterpret_cast<std::uint8_t*>(table.data()), table.size() * sizeof(std::uint64_t)};
 }
 
 }  // namespace
 
 struct Journal::Implementation {
-  std::filesystem::path file;  ///< empty: in memory
-  int fd = -1;
-  std::uint8_t* bytes = nullptr;  ///< the mapped file
-  std::size_t byte_count = 0;
-  std::vector<std::uint64_t> kept;  ///< in memory: the records
-  std::uint64_t* records = nullptr;
-  std::uint64_t* windows = nullptr;  ///< null in memory
+  std::unique_ptr<JournalStorage> storage;  ///< none: in memory
   std::size_t count = 0;
   std::size_t done_count = 0;
   std::size_t open_window = kNoWindow;
+  std::vector<std::uint64_t> windows, records;  ///< as they stand in the storage
+  bool is_broken = false;  ///< a sync failed: what is durable is no longer known, so nothing more is armed
 
-  Implementation() = default;
-  Implementation(const Implementation&) = delete;
-  Implementation& operator=(const Implementation&) = delete;
-  ~Implementation() {
-    if (bytes != nullptr) ::munmap(bytes, byte_count);
-    if (fd >= 0) ::close(fd);
-  }
-
-  Header& header() { return *reinterpret_cast<Header*>(bytes); }
-
-  void map() {
-    void* address = ::mmap(nullptr, byte_count, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-    if (address == MAP_FAILED) fail_errno(file, "can't be mapped");
-    bytes = static_cast<std::uint8_t*>(address);
-  }
-  void find_tables() {
-    windows = reinterpret_cast<std::uint64_t*>(bytes + kPage);
-    records = reinterpret_cast<std::uint64_t*>(bytes + kPage + window_table_bytes(count));
-  }
-
-  /// One aligned store: whole or not at all, and not before what was stored earlier.
-  static void store(std::uint64_t& place, std::uint64_t record) {
-    std::atomic_ref(place).store(record, std::memory_order_release);
+  void put(std::size_t place, std::uint64_t& kept, std::uint64_t record) {
+    if (storage) {
+      std::uint64_t copy = record;
+      storage->write(place, bytes_of(copy));
+    }
+    kept = record;
   }
   void set(std::size_t i, ExposureState state) {
-    store(records[i], make_record(kExposureSeed, i, static_cast<std::uint8_t>(state)));
+    put(records_place(count) + i * sizeof(std::uint64_t), records[i],
+        make_record(kExposureSeed, i, static_cast<std::uint8_t>(state)));
   }
-  void set_window(std::size_t w, std::uint8_t state) { store(windows[w], make_record(kWindowSeed, w, state)); }
+  void set_window(std::size_t w, std::uint8_t state) {
+    put(kTables + w * sizeof(std::uint64_t), windows[w], make_record(kWindowSeed, w, state));
+  }
 
   ExposureState get(std::size_t i) const {
     const auto state = record_state(kExposureSeed, i, records[i]);
@@ -169,54 +131,99 @@ struct Journal::Implementation {
                                                                                  : ExposureState::kInDoubt;
   }
 
-  void sync(const void* first, std::size_t length) {
-    const auto begin = static_cast<std::size_t>(static_cast<const std::uint8_t*>(first) - bytes);
-    const std::size_t page = begin / kPage * kPage;
-    if (::msync(bytes + page, begin + length - page, MS_SYNC) != 0) fail_errno(file, "can't be synced to disk");
+  void refuse_if_broken() const {
+    if (is_broken) throw std::runtime_error("the journal could not be synced to disk before: the job must be resumed");
+  }
+  void sync() {
+    if (!storage) return;
+    refuse_if_broken();
+    is_broken = true;  // unless it succeeds
+    storage->sync();
+    is_broken = false;
   }
 
-  std::size_t window_end(std::size_t w) const { return std::min(count, (w + 1) * kWindow); }
-
+  /// The records first: a closed window must never stand before what it says is durable.
   void close_window() {
-    if (windows == nullptr || open_window == kNoWindow) return;
-    const std::size_t first = open_window * kWindow;
-    sync(records + first, (window_end(open_window) - first) * sizeof(std::uint64_t));
+    if (!storage || open_window == kNoWindow) return;
+    sync();
     set_window(open_window, kClosed);
-    sync(windows + open_window, sizeof(std::uint64_t));
+    sync();
     open_window = kNoWindow;
   }
 
+  /// One sync for the records of the window before, one for both windows' states.
   void enter_window(std::size_t w) {
-    if (windows == nullptr || w == open_window) return;
-    close_window();
+    refuse_if_broken();
+    if (!storage || w == open_window) return;
+    if (open_window != kNoWindow) {
+      sync();
+      set_window(open_window, kClosed);
+    }
     set_window(w, kOpen);
-    sync(windows + w, sizeof(std::uint64_t));
     open_window = w;
+    sync();
   }
 
+  void write_boot(const std::string& boot_id) {
+    Boot boot{};
+    copy_text(boot.id, boot_id);
+    boot.checksum = block_checksum(boot);
+    storage->write(kBootPlace, bytes_of(boot));
+  }
+
+  void fill();
+  void load(const std::string& program_sha256);
   void recover(const std::string& boot_id);
 };
 
-/// After a kill the mapped storage is as it was: only what was armed is in doubt. After a power cut an open window's
-/// dots may have been exposed without a trace.
+/// Every exposure remaining, every window closed.
+void Journal::Implementation::fill() {
+  windows.resize(storage ? window_count(count) : 0);
+  records.resize(count);
+  for (std::size_t w = 0; w < windows.size(); ++w) windows[w] = make_record(kWindowSeed, w, kClosed);
+  for (std::size_t i = 0; i < count; ++i)
+    records[i] = make_record(kExposureSeed, i, static_cast<std::uint8_t>(ExposureState::kRemaining));
+}
+
+void Journal::Implementation::load(const std::string& program_sha256) {
+  const auto refuse = [](const char* sentence) { throw std::runtime_error(std::string("the journal ") + sentence); };
+  Header header{};
+  if (storage->size() < kTables) refuse("is no journal: it is too short");
+  storage->read(0, bytes_of(header));
+  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0) refuse("is no journal");
+  if (header.version != kVersion || header.window != kWindow) refuse("was written by another version");
+  if (header.checksum != block_checksum(header)) refuse("is damaged: its header fails its checksum");
+  if (header.count >= kCountMax || storage_bytes(header.count) != storage->size())
+    refuse("is damaged: its length does not fit its header");
+  if (field_text(header.program_sha256) != program_sha256) refuse("belongs to another program");
+  count = header.count;
+  windows.resize(window_count(count));
+  records.resize(count);
+  storage->read(kTables, bytes_of(windows));
+  storage->read(records_place(count), bytes_of(records));
+}
+
+/// After a kill the storage is as it was: only what was armed is in doubt. After a power cut an open window's dots may
+/// have been exposed without a trace. Everything is written anew, because what an earlier sync failed to keep looks
+/// clean to the system.
 void Journal::Implementation::recover(const std::string& boot_id) {
-  const bool is_same_boot = !boot_id.empty() && field_text(header().boot_id) == boot_id;
-  for (std::size_t w = 0; w < window_count(count); ++w) {
-    const bool is_closed = record_state(kWindowSeed, w, windows[w]) == kClosed;
-    for (std::size_t i = w * kWindow; i < window_end(w); ++i) {
-      const auto state = get(i);
-      const bool is_lost = !is_closed && !is_same_boot && state == ExposureState::kRemaining;
-      if (state == ExposureState::kArmed || state == ExposureState::kInDoubt || is_lost)
-        set(i, ExposureState::kInDoubt);
-      if (state == ExposureState::kDone) ++done_count;
-    }
+  Boot boot{};
+  storage->read(kBootPlace, bytes_of(boot));
+  const bool is_same_boot = !boot_id.empty() && boot.checksum == block_checksum(boot) && field_text(boot.id) == boot_id;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_closed = record_state(kWindowSeed, i / kWindow, windows[i / kWindow]) == kClosed;
+    auto state = get(i);
+    const bool is_lost = !is_closed && !is_same_boot && state == ExposureState::kRemaining;
+    if (state == ExposureState::kArmed || is_lost) state = ExposureState::kInDoubt;
+    if (state == ExposureState::kDone) ++done_count;
+    records[i] = make_record(kExposureSeed, i, static_cast<std::uint8_t>(state));
   }
-  // The records first: a closed window must never stand before what it says is durable.
-  sync(bytes, byte_count);
-  for (std::size_t w = 0; w < window_count(count); ++w) set_window(w, kClosed);
-  copy_text(header().boot_id, boot_id);
-  header().checksum = header_checksum(header());
-  sync(bytes, byte_count);
+  storage->write(records_place(count), bytes_of(records));
+  sync();
+  for (std::size_t w = 0; w < windows.size(); ++w) windows[w] = make_record(kWindowSeed, w, kClosed);
+  storage->write(kTables, bytes_of(windows));
+  write_boot(boot_id);
+  sync();
 }
 
 Journal::Journal(std::unique_ptr<Implementation> implementation) : implementation_(std::move(implementation)) {}
@@ -225,92 +232,83 @@ Journal::~Journal() {
   if (!implementation_) return;
   try {
     implementation_->close_window();
-  } catch (
-      const std::exception&) {  // the window stays open: after a power cut its dots will be in doubt, which is true
+  } catch (...) {  // the window stays open: after a power cut its dots will be in doubt, which is true
   }
 }
 
 Journal Journal::in_memory(std::size_t exposure_count) {
   auto journal = std::make_unique<Implementation>();
   journal->count = exposure_count;
-  journal->kept.resize(exposure_count);
-  journal->records = journal->kept.data();
-  for (std::size_t i = 0; i < exposure_count; ++i) journal->set(i, ExposureState::kRemaining);
+  journal->fill();
+  return Journal(std::move(journal));
+}
+
+std::size_t Journal::bytes_for(std::size_t exposure_count) {
+  return storage_bytes(exposure_count);
+}
+
+Journal Journal::create(std::unique_ptr<JournalStorage> storage, std::size_t exposure_count,
+                        const std::string& program_sha256, const std::string& boot_id) {
+  CHECK_LT(exposure_count, kCountMax);
+  CHECK_EQ(storage->size(), storage_bytes(exposure_count));
+  auto journal = std::make_unique<Implementation>();
+  journal->storage = std::move(storage);
+  journal->count = exposure_count;
+  journal->fill();
+  Header header{};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  header.version = kVersion;
+  header.window = kWindow;
+  header.count = exposure_count;
+  copy_text(header.program_sha256, program_sha256);
+  header.checksum = block_checksum(header);
+  journal->storage->write(0, bytes_of(header));
+  journal->write_boot(boot_id);
+  journal->storage->write(kTables, bytes_of(journal->windows));
+  journal->storage->write(records_place(exposure_count), bytes_of(journal->records));
+  journal->sync();
+  return Journal(std::move(journal));
+}
+
+Journal Journal::open(std::unique_ptr<JournalStorage> storage, const std::string& program_sha256,
+                      const std::string& boot_id) {
+  auto journal = std::make_unique<Implementation>();
+  journal->storage = std::move(storage);
+  journal->load(program_sha256);
+  journal->recover(boot_id);
   return Journal(std::move(journal));
 }
 
 Journal Journal::create(const std::filesystem::path& file, std::size_t exposure_count,
                         const std::string& program_sha256) {
   CHECK_LT(exposure_count, kCountMax);
-  const std::filesystem::path temporary = file.string() + ".part";
-  std::error_code ignored;
-  std::filesystem::remove(temporary, ignored);
-  auto journal = std::make_unique<Implementation>();
-  journal->file = file;
-  journal->count = exposure_count;
-  journal->byte_count = file_bytes(exposure_count);
-  journal->fd = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
-  if (journal->fd < 0) fail_errno(file, "can't be created");
-  try {
-    if (const int error = ::posix_fallocate(journal->fd, 0, static_cast<off_t>(journal->byte_count)); error != 0)
-      fail(file, std::string("no room for the journal: ") + std::strerror(error));
-    if (!lock_exclusively(journal->fd)) fail_errno(file, "is in use");
-    journal->map();
-    journal->find_tables();
-    Header header{};
-    std::memcpy(header.magic, kMagic, sizeof kMagic);
-    header.version = kVersion;
-    header.window = kWindow;
-    header.count = exposure_count;
-    copy_text(header.program_sha256, program_sha256);
-    copy_text(header.boot_id, current_boot_id());
-    header.checksum = header_checksum(header);
-    std::memcpy(journal->bytes, &header, sizeof header);
-    for (std::size_t w = 0; w < window_count(exposure_count); ++w) journal->set_window(w, kClosed);
-    for (std::size_t i = 0; i < exposure_count; ++i) journal->set(i, ExposureState::kRemaining);
-    journal->sync(journal->bytes, journal->byte_count);
-    if (::fsync(journal->fd) != 0) fail_errno(file, "can't be synced to disk");
-    // link, unlike rename, refuses to replace a journal that is already there.
-    if (::link(temporary.c_str(), file.c_str()) != 0) fail_errno(file, "can't be created");
-    ::unlink(temporary.c_str());
-    sync_folder(file);
-  } catch (...) {
-    std::filesystem::remove(temporary, ignored);
-    throw;
-  }
-  return Journal(std::move(journal));
+  auto storage = JournalFile::create(file, storage_bytes(exposure_count));
+  JournalFile& made = *storage;
+  Journal journal = create(std::move(storage), exposure_count, program_sha256, current_boot_id());
+  made.publish();
+  return journal;
 }
 
 Journal Journal::open(const std::filesystem::path& file, const std::string& program_sha256,
                       const std::string& boot_id) {
-  auto journal = std::make_unique<Implementation>();
-  journal->file = file;
-  journal->fd = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
-  if (journal->fd < 0) fail_errno(file, "can't be opened");
-  if (!lock_exclusively(journal->fd)) fail(file, "is in use by another program");
-  struct stat status {};
-  if (::fstat(journal->fd, &status) != 0) fail_errno(file, "can't be read");
-  if (status.st_size < static_cast<off_t>(kPage)) fail(file, "is no journal: it is too short");
-  journal->byte_count = static_cast<std::size_t>(status.st_size);
-  journal->map();
-  const Header& header = journal->header();
-  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0) fail(file, "is no journal");
-  if (header.checksum != header_checksum(header)) fail(file, "is damaged: its header fails its checksum");
-  if (header.version != kVersion || header.window != kWindow) fail(file, "was written by another version");
-  if (header.count >= kCountMax || file_bytes(header.count) != journal->byte_count)
-    fail(file, "is damaged: its length does not fit its header");
-  if (field_text(header.program_sha256) != program_sha256) fail(file, "belongs to another program");
-  journal->count = header.count;
-  journal->find_tables();
-  journal->recover(boot_id);
-  return Journal(std::move(journal));
+  auto storage = JournalFile::open(file);
+  try {
+    return open(std::move(storage), program_sha256, boot_id);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
 }
 
 std::string Journal::current_boot_id() {
   std::ifstream in("/proc/sys/kernel/random/boot_id");
   std::string id;
   std::getline(in, id);
-  return id.substr(0, sizeof(Header::boot_id));
+  return id.substr(0, sizeof(Boot::id));
+}
+
+void Journal::expect(std::size_t i) {
+  CHECK_LT(i, implementation_->count);
+  implementation_->enter_window(i / kWindow);
 }
 
 void Journal::arm(std::size_t i) {
@@ -358,7 +356,8 @@ std::size_t Journal::done_count() const {
 std::vector<std::size_t> Journal::in_doubt() const {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < implementation_->count; ++i)
-    if (implementation_->get(i) == ExposureState::kInDoubt) found.push_back(i);
+    if (const auto state = implementation_->get(i); state == ExposureState::kInDoubt || state == ExposureState::kArmed)
+      found.push_back(i);
   return found;
 }
 

@@ -6,16 +6,19 @@
 #include <string>
 #include <vector>
 
+#include "daemon/journal_storage.h"
+
 /// Which exposures are done: the memory of a painting job that must survive everything (no dot is exposed twice).
 ///
-/// File: a header page (magic, version, count, program, boot), one 8-byte record a window, one 8-byte record an
-/// exposure; every record carries a checksum over its state and place. Written in full before the job starts, so that a
-/// full disk is found before the first dot. Afterwards records are changed in memory-mapped storage, each by one atomic
-/// store: a killed process leaves every record whole, and at most one exposure armed. Before the first exposure of a
-/// window of kWindow is armed, the window's opening is synced to disk; a window is closed only after its records are.
-/// So after a power cut (the machine's boot id has changed) at most one window is open, and its exposures without a
-/// durable *done* are in doubt: at most kWindow. A record whose checksum is wrong is in doubt, too. One thread at a
-/// time; one process at a time (the file is locked).
+/// Storage: a header page (magic, version, count, program), a page with the machine's boot id, one 8-byte record a
+/// window, one 8-byte record an exposure; every record carries a checksum over its state and place. Written in full
+/// before the job starts, so that a full disk is found before the first dot. Afterwards each change is one write to the
+/// system before what it announces happens: a killed process leaves every record whole, and at most one exposure armed.
+/// Before the first exposure of a window of kWindow is armed, the window's opening is synced to disk; a window is
+/// closed only after its records are. So after a power cut (the boot id has changed), whichever of the writes since the
+/// last sync were lost or torn, one window is open whose exposures without a durable *done* are in doubt: at most
+/// kWindow. A record whose checksum is wrong is in doubt, too. One thread at a time; one process at a time (the file is
+/// locked).
 namespace hilbrush {
 
 enum class ExposureState : std::uint8_t { kRemaining = 0, kArmed = 1, kDone = 2, kInDoubt = 3 };
@@ -36,14 +39,23 @@ class Journal {
   /// damaged in its header, or is of another program.
   static Journal open(const std::filesystem::path& file, const std::string& program_sha256,
                       const std::string& boot_id = current_boot_id());
+  /// The same on any storage: of bytes_for() bytes, or what create() has written before.
+  static Journal create(std::unique_ptr<JournalStorage> storage, std::size_t exposure_count,
+                        const std::string& program_sha256, const std::string& boot_id);
+  static Journal open(std::unique_ptr<JournalStorage> storage, const std::string& program_sha256,
+                      const std::string& boot_id);
+  static std::size_t bytes_for(std::size_t exposure_count);
   /// Of the running kernel; empty if it can't be told, which open() takes for a power cut.
   static std::string current_boot_id();
   /// Syncs and closes the open window.
   ~Journal();
   Journal(Journal&&) noexcept;
 
+  /// Opens the exposure's window on disk if it is not open yet, so that arm() need not wait for the disk: called while
+  /// the axes move. @throws std::runtime_error
+  void expect(std::size_t i);
   /// The exposure must be kRemaining: that no dot is exposed twice is an invariant, not a hope. @throws
-  /// std::runtime_error if syncing fails.
+  /// std::runtime_error if it can't be written or synced; then nothing may be exposed.
   void arm(std::size_t i);
   void done(std::size_t i);
   /// An exposure whose pulse may have happened, wholly or in part.
@@ -58,7 +70,7 @@ class Journal {
   ExposureState state(std::size_t i) const;
   std::size_t exposure_count() const;
   std::size_t done_count() const;  ///< O(1)
-  /// Ascending. Cost: O(exposures).
+  /// Those that may have been exposed, one that is armed among them. Ascending. Cost: O(exposures).
   std::vector<std::size_t> in_doubt() const;
 
  private:

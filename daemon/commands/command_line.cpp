@@ -94,8 +94,10 @@ CLI::App* add_command(CLI::App& app, CommandContext& context, const std::string&
 CLI::App* add_daemon_command(CLI::App& app, CommandContext& context, const std::string& name,
                              const std::string& description) {
   CLI::App* command = add_command(app, context, name, description);
-  command->add_option("--socket", context.socket_path,
-                      "the daemon's socket (default $HILBRUSH_SOCKET, else /run/hilbrush/hilbrush.sock)");
+  command->add_option(
+      "--socket", context.socket_path,
+      "the daemon's socket, or tcp://HOST:PORT with a token in $HILBRUSH_TOKEN (default $HILBRUSH_SOCKET, "
+      "else /run/hilbrush/hilbrush.sock)");
   return command;
 }
 

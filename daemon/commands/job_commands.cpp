@@ -32,6 +32,8 @@ struct JobFlags {
   bool part_in_place = false;
   std::string in_doubt;
   std::string until = "done";
+  int copies = 1, position = 1;
+  bool is_queue = false;
 };
 
 /// The answer of every method that has one job as its result.
@@ -51,18 +53,28 @@ int submit(const CommandContext& context, const JobFlags& flags) {
               {"settings", Json::parse(flags.settings.to_json())},
               {"dry_run", flags.dry_run}};
   if (!flags.key.empty()) params["key"] = flags.key;
+  if (flags.copies != 1) params["copies"] = flags.copies;
   RpcClient client(context.socket_path);
   return print_job(context, client.call("job.submit", params, kSubmitTimeout), false);
 }
 
-int list(const CommandContext& context) {
+int list(const CommandContext& context, const JobFlags& flags) {
   RpcClient client(context.socket_path);
-  const Json result = client.call("job.list", Json());
+  const Json result = client.call("job.list", flags.is_queue ? Json{{"order", "queue"}} : Json());
   if (context.is_json)
     context.terminal.out << result.dump() << std::endl;
   else
     context.terminal.out << format_job_table(result.is_array() ? result : member(result, "jobs")) << std::flush;
   return kExitOk;
+}
+
+Json params_of(const JobFlags& flags) {
+  return {{"id", flags.id}};
+}
+
+int move(const CommandContext& context, const JobFlags& flags) {
+  RpcClient client(context.socket_path);
+  return print_job(context, client.call("job.move", Json{{"id", flags.id}, {"position", flags.position}}), false);
 }
 
 /// Only a person can see whether the part is there: a flag, or a question on a terminal.
@@ -84,10 +96,18 @@ int start(const CommandContext& context, const JobFlags& flags) {
   return print_job(context, client.call("job.start", Json{{"id", flags.id}, {"part_in_place", true}}), false);
 }
 
+/// The part is asked after only when something has happened since it was last seen in its place.
 int resume(const CommandContext& context, const JobFlags& flags) {
   Json params{{"id", flags.id}};
   if (!flags.in_doubt.empty()) params["in_doubt"] = flags.in_doubt;
   RpcClient client(context.socket_path);
+  const Json job = member(client.call("job.get", params_of(flags)), "job");
+  const bool is_asked_after = member(job, "needs_part_in_place") == true;
+  if (is_asked_after && !is_part_in_place(context, flags)) {
+    context.terminal.err << "hilbrush: not resumed: say --part-in-place once the part is where it was\n";
+    return kExitRefused;
+  }
+  if (is_asked_after || flags.part_in_place) params["part_in_place"] = true;
   return print_job(context, client.call("job.resume", params), false);
 }
 
@@ -125,6 +145,8 @@ void add_submit(CLI::App& app, CommandContext& context) {
   command.app->add_option("MODEL", command.flags->model, "VRML, OBJ, PLY, OFF or STL file")->required();
   command.app->add_flag("--dry-run", command.flags->dry_run, "paint on a simulated cell of its own; needs no start");
   command.app->add_option("--key", command.flags->key, "submitting again with the same key finds the same job");
+  command.app->add_option("--copies", command.flags->copies, "paint so many parts, one after another")
+      ->check(CLI::Range(1, 1000));
   command.flags->settings.add_to(*command.app);
 }
 
@@ -143,7 +165,9 @@ void add_watch(CLI::App& app, CommandContext& context) {
 void add_job_commands(CLI::App& app, CommandContext& context) {
   add_submit(app, context);
   add_watch(app, context);
-  declare(app, context, "list", "all jobs in a table", [](CommandContext& c, const JobFlags&) { return list(c); });
+  const Declared list_command = declare(app, context, "list", "all jobs in a table",
+                                        [](CommandContext& c, const JobFlags& f) { return list(c, f); });
+  list_command.app->add_flag("--queue", list_command.flags->is_queue, "only those that wait, in their order");
   declare_with_id(app, context, "get", "everything about one job",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.get", true); });
   const Declared start_command = declare_with_id(app, context, "start", "start painting a job that is ready", start);
@@ -155,6 +179,13 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
   resume_command.app
       ->add_option("--in-doubt", resume_command.flags->in_doubt, "dots that may have been exposed: leave or expose")
       ->check(CLI::IsMember({"leave", "expose"}));
+  resume_command.app->add_flag("--part-in-place", resume_command.flags->part_in_place,
+                               "the part is where it was (else you are asked, if that is not certain)");
+  const Declared move_command =
+      declare_with_id(app, context, "move", "give a waiting job another place in the queue", move);
+  move_command.app->add_option("POSITION", move_command.flags->position, "1: the next")
+      ->required()
+      ->check(CLI::PositiveNumber);
   declare_with_id(app, context, "cancel", "give a job up",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.cancel", false); });
 }

@@ -1,6 +1,7 @@
 #include "daemon/commands/rpc_client.h"
 
 #include <fcntl.h>
+#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -9,15 +10,20 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 namespace hilbrush {
 namespace {
 
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
+
+constexpr const char* kTcp = "tcp://";
 
 std::string system_message(int error) {
   return std::generic_category().message(error);
@@ -53,12 +59,13 @@ std::string text_of(const Json& object, const char* key) {
 }  // namespace
 
 RpcClient::RpcClient(std::string socket_path, Milliseconds timeout) : path_(std::move(socket_path)), timeout_(timeout) {
-  descriptor_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (descriptor_ < 0) throw ConnectionError("no socket can be made: " + system_message(errno));
   try {
-    connect_until(Clock::now() + timeout_);
+    if (path_.starts_with(kTcp))
+      connect_tcp(Clock::now() + timeout_);
+    else
+      connect_until(Clock::now() + timeout_);
   } catch (...) {
-    close(descriptor_);
+    if (descriptor_ >= 0) close(descriptor_);
     throw;
   }
 }
@@ -67,7 +74,40 @@ RpcClient::~RpcClient() {
   close(descriptor_);
 }
 
+void RpcClient::connect_tcp(Deadline deadline) {
+  const std::string place = path_.substr(std::strlen(kTcp));
+  const auto colon = place.rfind(':');
+  if (colon == std::string::npos) throw ConnectionError(path_ + ": expected tcp://HOST:PORT");
+  const char* token = std::getenv("HILBRUSH_TOKEN");
+  if (token == nullptr || *token == '\0')
+    throw ConnectionError(path_ + " wants a token: put it into the environment as HILBRUSH_TOKEN");
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  if (const int error = getaddrinfo(place.substr(0, colon).c_str(), place.substr(colon + 1).c_str(), &hints, &found))
+    throw ConnectionError(path_ + ": " + gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, &freeaddrinfo);
+  int error = ECONNREFUSED;
+  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
+    descriptor_ = socket(address->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (descriptor_ < 0) throw ConnectionError("no socket can be made: " + system_message(errno));
+    error = connect(descriptor_, address->ai_addr, address->ai_addrlen) == 0 ? 0 : errno;
+    if (error == EINPROGRESS) {
+      socklen_t length = sizeof error;
+      if (!wait_for(descriptor_, POLLOUT, deadline))
+        error = ETIMEDOUT;
+      else
+        getsockopt(descriptor_, SOL_SOCKET, SO_ERROR, &error, &length);
+    }
+    if (error == 0) break;
+    close(std::exchange(descriptor_, -1));
+  }
+  if (error != 0) throw ConnectionError("no daemon answers on " + path_ + ": " + system_message(error));
+  call("session.open", Json{{"token", token}});
+}
+
 void RpcClient::connect_until(Deadline deadline) {
+  descriptor_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (descriptor_ < 0) throw ConnectionError("no socket can be made: " + system_message(errno));
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path_.empty() || path_.size() >= sizeof(address.sun_path))

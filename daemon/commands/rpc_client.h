@@ -39,7 +39,8 @@ class RpcClient {
   static constexpr std::size_t kNotificationsMax =
       4096;  ///< kept while an answer is waited for; older ones are dropped
 
-  /// Connects. @throws ConnectionError
+  /// Connects: to a Unix socket's path, or to "tcp://HOST:PORT", where the token in $HILBRUSH_TOKEN says who asks.
+  /// @throws ConnectionError, RpcRefusal (nobody's token)
   explicit RpcClient(std::string socket_path, Milliseconds timeout = Milliseconds(10000));
   ~RpcClient();
   RpcClient(const RpcClient&) = delete;
@@ -64,6 +65,7 @@ class RpcClient {
   using Deadline = std::chrono::steady_clock::time_point;
 
   void connect_until(Deadline deadline);
+  void connect_tcp(Deadline deadline);
   void send_line(const std::string& line, Deadline deadline);
   std::optional<std::string> read_line(Deadline deadline);
   std::optional<nlohmann::ordered_json> read_message(Deadline deadline);

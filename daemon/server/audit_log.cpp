@@ -43,8 +43,11 @@ void AuditLog::record(const Peer& peer, const std::string& method, const Json& p
     std::string summary =
         params.dump(-1, ' ', true, Json::error_handler_t::replace);  // ASCII: control characters can't forge lines
     if (summary.size() > kSummaryBytes) summary.resize(kSummaryBytes);
-    const Json line{{"time", utc_now_ms()}, {"uid", peer.uid},   {"pid", peer.pid},
-                    {"method", method},     {"params", summary}, {"result", result}};
+    Json line{{"time", utc_now_ms()}, {"user", peer.user}, {"uid", peer.uid}, {"pid", peer.pid}};
+    if (!peer.address.empty()) line["address"] = peer.address;
+    line["method"] = method;
+    line["params"] = summary;
+    line["result"] = result;
     const std::string text = line.dump(-1, ' ', true, Json::error_handler_t::replace) + "\n";
     [[maybe_unused]] const ssize_t written = ::write(fd_, text.data(), text.size());
   } catch (const std::exception&) {

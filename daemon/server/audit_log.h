@@ -2,10 +2,12 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/server/job_book.h"
+#include "daemon/server/json_rpc.h"
+#include "daemon/server/peer.h"
 
-/// Who did what: one line an act (requests that only look are not recorded) with time, uid, pid, method, a summary of
-/// the parameters, and the result. Appended to, never rewritten; rotation is the system's. Socket thread only.
+/// Who did what: one line an act (requests that only look are not recorded) with time, user, uid, pid, address, method,
+/// a summary of the parameters, and the result. Appended to, never rewritten; rotation is the system's. Socket thread
+/// only.
 namespace hilbrush {
 
 class AuditLog {

@@ -45,18 +45,40 @@ void CellDesk::refuse(const std::string& act) const {
   throw RpcFault{kRpcWrongState, "the cell is " + std::string(state_name()) + ": " + act, ""};
 }
 
-Json CellDesk::stop(const std::string& reason) {
-  is_laser_proved_off_ = thread_.stop();
+void CellDesk::stop(const std::string& reason, Reply reply) {
   state_ = State::kStopped;
+  is_laser_proved_off_ = false;
   reason_ = reason;
   job_.clear();
   ++stops_;
+  thread_.stop([this, reply = std::move(reply)](bool is_laser_off) {
+    is_laser_proved_off_ = is_laser_off;
+    if (reply.result) reply.result(status());
+    note_executor_at_rest();
+  });
   if (waiting_clear_) {
     const Reply overtaken = *std::exchange(waiting_clear_, std::nullopt);
     overtaken.fault({kRpcWrongState, "the cell was stopped again before it was cleared", ""});
   }
   if (on_stop) on_stop();
-  return status();
+}
+
+void CellDesk::look_at_devices() {
+  if (state_ != State::kIdle && state_ != State::kArmed) return;
+  const Cell cell = devices_.cell();
+  const auto check_axes = [this](const char* name, const auto& axes) {
+    if (axes.state == DeviceState::kFault) stop(std::string("the ") + name + " reports a fault: " + axes.fault);
+    if (axes.state == DeviceState::kDisconnected) stop(std::string("the ") + name + " is disconnected");
+    return state_ != State::kStopped;
+  };
+  if (!check_axes("robot", cell.robot.status()) || !check_axes("table", cell.table.status())) return;
+  const auto laser = cell.laser.status();
+  if (laser.is_emitting) return stop("the laser emits although nothing is painted");
+  if (state_ != State::kArmed) return;  // an open interlock at rest is how a part is changed
+  if (!laser.interlock_closed) return stop("the interlock was opened");
+  if (laser.state != DeviceState::kReady)
+    stop(std::string("the laser is no longer armed but ") + device_state_name(laser.state) +
+         (laser.fault.empty() ? "" : ": " + laser.fault));
 }
 
 /// While the executor still comes to rest after a stop, its flag must stay up: the clear waits.

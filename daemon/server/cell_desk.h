@@ -26,7 +26,8 @@ class CellDesk {
   State state() const { return state_; }
   const char* state_name() const;
 
-  Json stop(const std::string& reason);
+  /// Latched when this returns; the reply, if one is wanted, comes when the laser has confirmed or has failed to.
+  void stop(const std::string& reason, Reply reply = {});
   void clear(Reply reply);
   void arm(Reply reply);
   void home(Reply reply);
@@ -41,6 +42,11 @@ class CellDesk {
 
   /// Called after every stop; set once.
   std::function<void()> on_stop;
+  /// Devices are looked at while nothing runs that would: one that fails at rest stops the cell, and so does an
+  /// interlock that is opened while the laser is armed. To be called several times a second.
+  void look_at_devices();
+  /// Why the cell is stopped.
+  const std::string& reason() const { return reason_; }
   /// To be called when the executor's thread has answered: a clear that waited for it begins.
   void note_executor_at_rest();
 

@@ -34,6 +34,12 @@ std::string file_sha256(const std::filesystem::path& file) {
   return hash.hex_digest();
 }
 
+/// The files of the first copy bear no number.
+std::filesystem::path copy_file(const PaintOrder& order, const char* stem, const char* extension) {
+  const std::string number = order.copy > 1 ? "-" + std::to_string(order.copy) : "";
+  return order.folder / (stem + number + extension);
+}
+
 void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
   const auto refuse = [](const char* what) {
     throw JobFilesFault(std::string("the program was made for ") + what +
@@ -42,6 +48,9 @@ void check_provenance(const Provenance& found, const PaintOrder& order, const Ce
   if (found.cell_sha256 != description.sha256) refuse("another cell file");
   if (found.model_sha256 != order.model_sha256) refuse("another model");
   if (found.settings_sha256 != order.settings_sha256) refuse("other settings");
+  if (found.version != HILBRUSH_VERSION)
+    throw JobFilesFault("the program was made by version " + found.version + " of hilbrush, and this is " +
+                        HILBRUSH_VERSION + ": submit the model again");
 }
 
 }  // namespace
@@ -50,10 +59,11 @@ CellThread::CellThread(CellDevices& devices, const CellDescription& description,
     : devices_(devices), cell_(devices.cell()), description_(description), post_(std::move(post)) {
   control_.stop.store(true);  // the cell starts stopped
   thread_ = std::thread([this] { run(); });
+  stop_thread_ = std::thread([this] { carry_out_stops(); });
 }
 
 CellThread::~CellThread() {
-  stop();
+  stop_now();
   {
     const std::lock_guard lock(mutex_);
     is_ending_ = true;
@@ -61,10 +71,40 @@ CellThread::~CellThread() {
   }
   woken_.notify_all();
   thread_.join();
+  stop_thread_.join();
 }
 
-bool CellThread::stop() noexcept {
+bool CellThread::stop_now() noexcept {
   return request_stop(cell_, control_);
+}
+
+void CellThread::stop(std::function<void(bool)> done) {
+  control_.stop.store(true);
+  ++orders_under_way_;
+  {
+    const std::lock_guard lock(mutex_);
+    stops_.push_back(std::move(done));
+  }
+  woken_.notify_all();
+}
+
+/// Stops that were asked for meanwhile are carried out together.
+void CellThread::carry_out_stops() {
+  for (;;) {
+    std::vector<std::function<void(bool)>> asked;
+    {
+      std::unique_lock lock(mutex_);
+      woken_.wait(lock, [this] { return is_ending_ || !stops_.empty(); });
+      if (is_ending_) return;
+      asked.swap(stops_);
+    }
+    const bool is_off = stop_now();
+    for (auto& done : asked)
+      post_([this, is_off, done = std::move(done)] {
+        --orders_under_way_;
+        done(is_off);
+      });
+  }
 }
 
 void CellThread::push(std::function<void()> task) {
@@ -180,9 +220,9 @@ Joints CellThread::true_joints() const {
   return {robot[0], robot[1], robot[2], robot[3], table[0], table[1]};
 }
 
-CellThread::Loaded CellThread::load(const PaintOrder& order, bool may_create) const {
+CellThread::Loaded CellThread::load(const PaintOrder& order) const {
   const auto program_file = order.folder / "program.ply";
-  const auto journal_file = order.folder / "journal";
+  const auto journal_file = copy_file(order, "journal", "");
   ExposureProgram program;
   try {
     program = read_program(program_file);
@@ -192,7 +232,11 @@ CellThread::Loaded CellThread::load(const PaintOrder& order, bool may_create) co
   check_provenance(program.provenance, order, description_);
   const std::string sha256 = file_sha256(program_file);
   // What is wrong with a journal may be mended; the job stays resumable.
-  const bool is_new = may_create && !std::filesystem::exists(journal_file);
+  const bool is_new = !std::filesystem::exists(journal_file);
+  if (is_new && !order.may_create_journal)
+    throw std::runtime_error(journal_file.string() +
+                             ": the journal is missing, so nobody knows what was exposed: this part can't be finished; "
+                             "cancel the job and submit it again for a new part");
   Journal journal =
       is_new ? Journal::create(journal_file, program.exposures.size(), sha256) : Journal::open(journal_file, sha256);
   if (journal.exposure_count() != program.exposures.size()) throw JobFilesFault("the journal does not fit the program");
@@ -212,13 +256,13 @@ void CellThread::prepare(PaintOrder wanted, std::function<void(Prepared)> done) 
         Prepared prepared;
         try {
           loaded_.reset();
-          loaded_.emplace(load(wanted, true));
+          loaded_.emplace(load(wanted));
           Journal& journal = loaded_->journal;
           if (wanted.exposes_in_doubt)
             for (const std::size_t i : journal.in_doubt()) journal.expose_again(i);
           for (std::size_t i = 0; i < journal.exposure_count() && !prepared.next; ++i)
             if (journal.state(i) == ExposureState::kRemaining) prepared.next = i;
-          devices_.record_emissions(wanted.folder / "emissions.ply");
+          devices_.record_emissions(copy_file(wanted, "emissions", ".ply"));
           prepared.tally = tally(*loaded_);
           prepared.from = loaded_->from = true_joints();
         } catch (const std::exception& error) {
@@ -281,7 +325,7 @@ void CellThread::inspect(PaintOrder wanted, std::function<void(std::optional<Pai
   order(
       [this, wanted = std::move(wanted)]() -> std::optional<PaintTally> {
         try {
-          return tally(load(wanted, false));
+          return tally(load(wanted));
         } catch (const std::exception&) {
           return std::nullopt;
         }

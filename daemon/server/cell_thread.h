@@ -16,8 +16,8 @@
 #include "daemon/server/cell_devices.h"
 
 /// The executor's thread: the only one that commands motion. Orders come from the socket thread through a queue of at
-/// most kQueueMax; answers go back as closures posted to the socket thread. stop() alone acts from the caller's thread,
-/// at once.
+/// most kQueueMax; answers go back as closures posted to the socket thread. Stops overtake everything: they have a
+/// thread of their own.
 namespace hilbrush {
 
 /// Hands a closure to the socket thread. Any thread.
@@ -25,9 +25,11 @@ using Post = std::function<void(std::function<void()>)>;
 
 /// What to paint, and what its program must have been made from.
 struct PaintOrder {
-  std::filesystem::path folder;  ///< program.ply, journal, emissions.ply
+  std::filesystem::path folder;  ///< program.ply, and for each copy a journal and emissions
   std::string model_sha256, settings_sha256;
-  bool exposes_in_doubt = false;  ///< the operator orders the dots in doubt again
+  int copy = 1;                     ///< journal, emissions.ply; from the second on journal-2, emissions-2.ply, ...
+  bool may_create_journal = false;  ///< nothing of this copy has ever been painted
+  bool exposes_in_doubt = false;    ///< the operator orders the dots in doubt again
 };
 
 /// How far a job is, by its journal.
@@ -63,7 +65,10 @@ class CellThread {
 
   /// Laser off, emission disabled, axes stopped; latched until release_stop(). Any thread. @return true if the laser
   /// confirms.
-  bool stop() noexcept;
+  bool stop_now() noexcept;
+  /// The same from a thread of its own, so that a device which does not answer delays no other request: no pulse is
+  /// begun any more when this returns, and `done` is told whether the laser confirms.
+  void stop(std::function<void(bool is_laser_off)> done);
   bool is_stop_latched() const { return control_.stop.load(); }
   /// The run ends between two dots. Socket thread, as everything below; callbacks are posted there.
   void pause() { control_.pause.store(true); }
@@ -103,7 +108,8 @@ class CellThread {
   void order(Work work, Answer answer);
   void push(std::function<void()> task);
   void run();
-  Loaded load(const PaintOrder& order, bool may_create) const;
+  void carry_out_stops();
+  Loaded load(const PaintOrder& order) const;
   static PaintTally tally(const Loaded& loaded);
   Joints true_joints() const;
   void arm_devices();
@@ -119,9 +125,10 @@ class CellThread {
   std::optional<Loaded> loaded_;  ///< the executor thread's
   std::mutex mutex_;
   std::condition_variable woken_;
-  std::deque<std::function<void()>> tasks_;  ///< guarded by mutex_
-  bool is_ending_ = false;                   ///< guarded by mutex_
-  std::thread thread_;
+  std::deque<std::function<void()>> tasks_;       ///< guarded by mutex_
+  std::vector<std::function<void(bool)>> stops_;  ///< asked for, not yet carried out; guarded by mutex_
+  bool is_ending_ = false;                        ///< guarded by mutex_
+  std::thread thread_, stop_thread_;
 };
 
 }  // namespace hilbrush

@@ -1,9 +1,12 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+
+#include "config/daemon_settings.h"
 
 /// hilbrushd as a value: everything that lives between its start and its end. The program's main and the tests hold one
 /// each.
@@ -15,6 +18,9 @@
 /// calls.
 namespace hilbrush {
 
+class CellDevices;
+struct CellDescription;
+
 struct DaemonOptions {
   std::filesystem::path socket;             ///< of the operator's command, mode 0660
   std::filesystem::path state;              ///< folder: jobs.sqlite, jobs/, audit.log, lock
@@ -23,6 +29,9 @@ struct DaemonOptions {
   std::filesystem::path pipeline;           ///< the program hilbrush-pipeline
   double pipeline_silence_s = 60;           ///< a child that says nothing for so long is killed
   std::uint64_t pipeline_memory_mb = 8192;  ///< a child that grows beyond is killed
+  DaemonSettings settings;                  ///< who may connect
+  /// Instead of the devices that the cell file names: for tests that bring devices which misbehave.
+  std::function<std::unique_ptr<CellDevices>(const CellDescription&)> make_devices;
 };
 
 class Daemon {
@@ -33,8 +42,12 @@ class Daemon {
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
-  /// SIGTERM and SIGINT end the daemon in order. Before run().
-  void end_on_signals();
+  /// SIGTERM and SIGINT end the daemon in order; `on_signal` is called first. Before run().
+  void end_on_signals(std::function<void()> on_signal = {});
+  /// Calls `task` on the socket thread again and again: as long as it is called, requests are served. Before run().
+  void every(double period_s, std::function<void()> task);
+  /// host:port that is listened on, or empty.
+  const std::string& tcp_address() const;
   /// Serves until end(): then the laser is off, the cell stopped, a painting job paused.
   void run();
   /// Any thread.

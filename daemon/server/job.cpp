@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ctime>
 #include <utility>
 
 namespace hilbrush {
@@ -31,9 +32,121 @@ std::optional<JobState> job_state_from_name(const std::string& name) {
   return std::nullopt;
 }
 
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
 bool is_final(JobState state) {
   return state == JobState::kDone || state == JobState::kFailed || state == JobState::kCancelled;
 }
+
+bool is_in_queue(JobState state) {
+  return state == JobState::kQueued || state == JobState::kPlanning || state == JobState::kReady ||
+         state == JobState::kPaused;
+}
+
+std::string job_to_record(const Job& job) {
+  Json json{{"id", job.id},
+            {"key", job.key},
+            {"uid", job.uid},
+            {"gid", job.gid},
+            {"state", job_state_name(job.state)},
+            {"model", job.model.string()},
+            {"model_copy", job.model_copy.string()},
+            {"model_sha256", job.model_sha256},
+            {"settings", job.settings},
+            {"settings_sha256", job.settings_sha256},
+            {"cell", job.cell},
+            {"dry_run", job.dry_run},
+            {"rank", job.rank},
+            {"copies", job.copies},
+            {"copies_done", job.copies_done},
+            {"is_begun", job.is_begun},
+            {"created", job.created},
+            {"started", job.started},
+            {"ended", job.ended},
+            {"placed", job.placed},
+            {"skipped", job.skipped},
+            {"exposed", job.exposed},
+            {"planned_s", job.planned_s},
+            {"own_dots", job.own_time.dots},
+            {"own_median_s", job.own_time.median_s},
+            {"own_p99_s", job.own_time.p99_s},
+            {"error_at", job.error ? Json(job.error->at) : Json(nullptr)},
+            {"error_message", job.error ? Json(job.error->message) : Json(nullptr)},
+            {"warnings", job.warnings}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::optional<Job> job_from_record(const std::string& text) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return std::nullopt;
+  const auto take = [&](const char* key, auto& value) {
+    const auto found = json.find(key);
+    if (found == json.end() || found->is_null()) return false;
+    try {
+      value = found->template get<std::decay_t<decltype(value)>>();
+      return true;
+    } catch (const Json::exception&) {
+      return false;
+    }
+  };
+  const auto take_path = [&](const char* key, std::filesystem::path& path) {
+    std::string value;
+    if (take(key, value)) path = value;
+  };
+  Job job;
+  std::string state;
+  if (!take("id", job.id) || job.id <= 0 || !take("state", state) || !job_state_from_name(state)) return std::nullopt;
+  job.state = *job_state_from_name(state);
+  take("key", job.key);
+  take("uid", job.uid);
+  take("gid", job.gid);
+  take_path("model", job.model);
+  take_path("model_copy", job.model_copy);
+  take("model_sha256", job.model_sha256);
+  take("settings", job.settings);
+  take("settings_sha256", job.settings_sha256);
+  take("cell", job.cell);
+  take("dry_run", job.dry_run);
+  take("rank", job.rank);
+  take("copies", job.copies);
+  take("copies_done", job.copies_done);
+  take("is_begun", job.is_begun);
+  take("created", job.created);
+  take("started", job.started);
+  take("ended", job.ended);
+  take("placed", job.placed);
+  take("skipped", job.skipped);
+  take("exposed", job.exposed);
+  take("planned_s", job.planned_s);
+  take("own_dots", job.own_time.dots);
+  take("own_median_s", job.own_time.median_s);
+  take("own_p99_s", job.own_time.p99_s);
+  JobError error;
+  take("error_at", error.at);
+  if (take("error_message", error.message)) job.error = error;
+  take("warnings", job.warnings);
+  return job;
+}
+
+namespace {
+
+Json text_or_null(const std::string& text) {
+  return text.empty() ? Json(nullptr) : Json(text);
+}
+
+Json own_time_json(const Job::OwnTime& own) {
+  if (own.dots == 0) return nullptr;
+  return {{"dots", own.dots}, {"own_ms", {{"median", own.median_s * 1e3}, {"p99", own.p99_s * 1e3}}}};
+}
+
+}  // namespace
 
 Json job_to_json(const Job& job) {
   const auto listed = std::min(job.in_doubt.size(), kListedInDoubtMax);
@@ -56,9 +169,18 @@ Json job_to_json(const Job& job) {
       std::vector<std::uint32_t>(job.in_doubt.begin(), job.in_doubt.begin() + static_cast<std::ptrdiff_t>(listed));
   json["warnings"] = job.warnings;
   json["model_copy"] = job.model_copy.empty() ? Json(nullptr) : Json(job.model_copy.string());
-  json["settings"] = job.settings.empty() ? Json::object() : Json::parse(job.settings);
+  const Json settings = Json::parse(job.settings, nullptr, false);
+  json["settings"] = settings.is_object() ? settings : Json::object();
   json["created"] = job.created;
-  json["key"] = job.key.empty() ? Json(nullptr) : Json(job.key);
+  json["started"] = text_or_null(job.started);
+  json["ended"] = text_or_null(job.ended);
+  json["key"] = text_or_null(job.key);
+  json["copies"] = job.copies;
+  json["copies_done"] = job.copies_done;
+  json["position"] = job.position > 0 ? Json(job.position) : Json(nullptr);
+  const bool can_paint = !job.dry_run && (job.state == JobState::kReady || job.state == JobState::kPaused);
+  json["needs_part_in_place"] = can_paint && !job.is_part_confirmed;
+  json["timing"] = own_time_json(job.own_time);
   return json;
 }
 

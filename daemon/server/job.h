@@ -6,17 +6,25 @@
 #include <string>
 #include <vector>
 
+#include "daemon/duration_histogram.h"
+
 /// A job as the daemon remembers and tells it. Plain data; the socket thread owns it.
 namespace hilbrush {
 
 using Json = nlohmann::ordered_json;
 
-/// queued -> planning -> ready -> painting <-> paused -> done | failed | cancelled. Dry jobs go from planning to done.
+/// queued -> planning -> ready -> painting <-> paused -> done | failed | cancelled. Dry jobs go from planning to done;
+/// a job of several copies goes from painting to ready after each but the last.
 enum class JobState { kQueued, kPlanning, kReady, kPainting, kPaused, kDone, kFailed, kCancelled };
 const char* job_state_name(JobState state);
 std::optional<JobState> job_state_from_name(const std::string& name);
 /// Nothing happens to the job any more.
 bool is_final(JobState state);
+/// It waits to be planned or painted: its place among the others that wait can be changed.
+bool is_in_queue(JobState state);
+
+/// ISO 8601, UTC, to the second.
+std::string utc_now();
 
 struct JobError {
   std::string at;  ///< file:line, JSON path, device, or empty
@@ -33,10 +41,14 @@ struct Job {
   std::string settings;              ///< canonical JSON
   std::string cell;  ///< what the pipeline is told: the daemon's cell file, or another's name for a dry run
   bool dry_run = false;
-  std::string created;           ///< ISO 8601, UTC
-  std::filesystem::path folder;  ///< model/, program.ply, dots.ply, report.json, journal, emissions.ply
+  std::int64_t rank = 0;  ///< jobs that wait are planned, listed and painted in ascending order
+  int copies = 1;         ///< parts to paint, one after another
+  int copies_done = 0;
+  bool is_begun = false;                ///< the journal of the present copy exists: it must never be made anew
+  std::string created, started, ended;  ///< ISO 8601, UTC; started: first painted; empty: not yet
+  std::filesystem::path folder;  ///< job.json, model/, program.ply, dots.ply, report.json, journal, emissions.ply
 
-  /// Counts of dots; placed = exposed + in doubt + remaining + skipped.
+  /// Counts of dots of the present copy; placed = exposed + in doubt + remaining + skipped.
   std::uint64_t placed = 0, exposed = 0, skipped = 0;
   std::vector<std::uint32_t> in_doubt;  ///< dot indices, ascending in the program
   std::string stage;                    ///< what is being done, or empty
@@ -48,6 +60,16 @@ struct Job {
   std::string model_sha256;           ///< over the copied files, as programs name it
   std::string settings_sha256;
 
+  /// The wall time that Hilbrush itself adds to each dot, of this daemon's life or the last one known.
+  struct OwnTime {
+    std::uint64_t dots = 0;
+    double median_s = 0, p99_s = 0;
+  } own_time;
+  DurationHistogram own_times;
+
+  /// Not kept: somebody has seen the part in its place and nothing has happened since that could have moved it.
+  bool is_part_confirmed = false;
+  int position = 0;       ///< in the queue, from 1; 0: not in it. Not kept.
   std::uint64_t seq = 0;  ///< rises with every change that is told; begins anew with the daemon
 
   static constexpr std::size_t kWarningsMax = 20;
@@ -58,6 +80,11 @@ struct Job {
     return exposure_count() > used ? exposure_count() - used : 0;
   }
 };
+
+/// Everything that is kept of a job, as text, and back. Reading is tolerant: what is missing or of a wrong type keeps
+/// its default, and a text that is no job at all is none.
+std::string job_to_record(const Job& job);
+std::optional<Job> job_from_record(const std::string& text);
 
 /// The job object of the protocol. At most 1000 in-doubt dots are listed; dots.in_doubt counts them all.
 Json job_to_json(const Job& job);

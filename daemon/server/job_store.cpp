@@ -10,7 +10,7 @@ namespace hilbrush {
 namespace {
 
 /// Step i brings a database from version i to i + 1. Steps are added, never changed.
-constexpr std::array<const char*, 1> kMigrations{R"(
+constexpr std::array<const char*, 2> kMigrations{R"(
   CREATE TABLE job (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     key TEXT UNIQUE,
@@ -24,12 +24,35 @@ constexpr std::array<const char*, 1> kMigrations{R"(
     planned_s REAL NOT NULL,
     error_at TEXT, error_message TEXT,
     warnings TEXT NOT NULL);
+)",
+                                                 // Jobs that have been painted on have a journal.
+                                                 R"(
+  ALTER TABLE job ADD COLUMN rank INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE job ADD COLUMN copies INTEGER NOT NULL DEFAULT 1;
+  ALTER TABLE job ADD COLUMN copies_done INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE job ADD COLUMN is_begun INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE job ADD COLUMN started TEXT NOT NULL DEFAULT '';
+  ALTER TABLE job ADD COLUMN ended TEXT NOT NULL DEFAULT '';
+  ALTER TABLE job ADD COLUMN own_dots INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE job ADD COLUMN own_median_s REAL NOT NULL DEFAULT 0;
+  ALTER TABLE job ADD COLUMN own_p99_s REAL NOT NULL DEFAULT 0;
+  UPDATE job SET rank = id, is_begun = (dry_run = 0 AND state IN ('painting', 'paused', 'done'));
+  UPDATE job SET copies_done = 1 WHERE dry_run = 0 AND state = 'done';
+  CREATE INDEX job_state ON job (state);
 )"};
 
 constexpr const char* kColumns =
     "key, uid, gid, state, model, model_copy, model_sha256, settings, settings_sha256, cell, dry_run, created, placed, "
-    "skipped, exposed, "
-    "planned_s, error_at, error_message, warnings";
+    "skipped, exposed, planned_s, error_at, error_message, warnings, rank, copies, copies_done, is_begun, started, "
+    "ended, "
+    "own_dots, own_median_s, own_p99_s";
+constexpr int kColumnCount = 28;
+
+std::string marks() {
+  std::string text = "?";
+  for (int i = 1; i < kColumnCount; ++i) text += ", ?";
+  return text;
+}
 
 void migrate(SQLite::Database& database) {
   const int version = database.execAndGet("PRAGMA user_version").getInt();
@@ -85,6 +108,15 @@ void bind(SQLite::Statement& statement, const Job& job) {
   text_or_null(job.error.has_value(), job.error ? job.error->at : "");
   text_or_null(job.error.has_value(), job.error ? job.error->message : "");
   text(Json(job.warnings).dump(-1, ' ', false, Json::error_handler_t::replace));
+  statement.bind(++i, job.rank);
+  statement.bind(++i, job.copies);
+  statement.bind(++i, job.copies_done);
+  number(job.is_begun ? 1 : 0);
+  text(job.started);
+  text(job.ended);
+  number(job.own_time.dots);
+  statement.bind(++i, job.own_time.median_s);
+  statement.bind(++i, job.own_time.p99_s);
 }
 
 Job read_job(SQLite::Statement& row) {
@@ -117,6 +149,15 @@ Job read_job(SQLite::Statement& row) {
   if (warnings.is_array())
     for (const auto& warning : warnings)
       if (warning.is_string()) job.warnings.push_back(warning.get<std::string>());
+  job.rank = row.getColumn(i++).getInt64();
+  job.copies = row.getColumn(i++).getInt();
+  job.copies_done = row.getColumn(i++).getInt();
+  job.is_begun = number() != 0;
+  job.started = text();
+  job.ended = text();
+  job.own_time.dots = number();
+  job.own_time.median_s = row.getColumn(i++).getDouble();
+  job.own_time.p99_s = row.getColumn(i++).getDouble();
   return job;
 }
 
@@ -135,10 +176,18 @@ std::filesystem::path set_file_aside(const std::filesystem::path& file) {
 
 struct JobStore::Implementation {
   std::unique_ptr<SQLite::Database> database;
+
+  std::vector<Job> select(const std::string& condition) {
+    std::vector<Job> jobs;
+    SQLite::Statement rows(*database, std::string("SELECT id, ") + kColumns + " FROM job " + condition);
+    while (rows.executeStep()) jobs.push_back(read_job(rows));
+    return jobs;
+  }
 };
 
 JobStore::JobStore(const std::filesystem::path& file, std::string* set_aside)
     : implementation_(std::make_unique<Implementation>()) {
+  is_new_ = !std::filesystem::exists(file);
   try {
     implementation_->database = open_checked(file);
     return;
@@ -146,9 +195,10 @@ JobStore::JobStore(const std::filesystem::path& file, std::string* set_aside)
     if (!std::filesystem::exists(file))
       throw std::runtime_error(file.string() + ": no job store can be made: " + error.what());
     const auto aside = set_file_aside(file);
+    is_new_ = true;
     if (set_aside != nullptr)
       *set_aside = file.string() + " can't be used (" + error.what() + "); it was set aside as " +
-                   aside.filename().string() + " and the daemon starts without jobs";
+                   aside.filename().string() + ", and the jobs are taken from the records in their folders";
   }
   try {
     implementation_->database = open_checked(file);
@@ -160,30 +210,49 @@ JobStore::JobStore(const std::filesystem::path& file, std::string* set_aside)
 JobStore::~JobStore() = default;
 
 void JobStore::insert(Job& job) {
-  std::string marks = "?";
-  for (int i = 1; i < 19; ++i) marks += ", ?";
   SQLite::Statement statement(*implementation_->database,
-                              std::string("INSERT INTO job (") + kColumns + ") VALUES (" + marks + ")");
+                              std::string("INSERT INTO job (") + kColumns + ") VALUES (" + marks() + ")");
   bind(statement, job);
   statement.exec();
   job.id = implementation_->database->getLastInsertRowid();
 }
 
-void JobStore::update(const Job& job) {
-  std::string marks = "?";
-  for (int i = 1; i < 19; ++i) marks += ", ?";
-  SQLite::Statement statement(*implementation_->database,
-                              std::string("UPDATE job SET (") + kColumns + ") = (" + marks + ") WHERE id = ?");
+void JobStore::insert_with_id(const Job& job) {
+  SQLite::Statement statement(*implementation_->database, std::string("INSERT OR IGNORE INTO job (") + kColumns +
+                                                              ", id) VALUES (" + marks() + ", ?)");
   bind(statement, job);
-  statement.bind(20, job.id);
+  statement.bind(kColumnCount + 1, job.id);
   statement.exec();
 }
 
-std::vector<Job> JobStore::load_all() {
-  std::vector<Job> jobs;
-  SQLite::Statement rows(*implementation_->database, std::string("SELECT id, ") + kColumns + " FROM job ORDER BY id");
-  while (rows.executeStep()) jobs.push_back(read_job(rows));
-  return jobs;
+void JobStore::update(const Job& job) {
+  SQLite::Statement statement(*implementation_->database,
+                              std::string("UPDATE job SET (") + kColumns + ") = (" + marks() + ") WHERE id = ?");
+  bind(statement, job);
+  statement.bind(kColumnCount + 1, job.id);
+  statement.exec();
+}
+
+std::vector<Job> JobStore::load_recent(std::size_t final_count) {
+  const std::string is_final = "state IN ('done', 'failed', 'cancelled')";
+  return implementation_->select("WHERE NOT " + is_final + " OR id IN (SELECT id FROM job WHERE " + is_final +
+                                 " ORDER BY id DESC LIMIT " + std::to_string(final_count) + ") ORDER BY id");
+}
+
+std::optional<Job> JobStore::find(std::int64_t id) {
+  auto found = implementation_->select("WHERE id = " + std::to_string(id));
+  return found.empty() ? std::nullopt : std::optional<Job>(std::move(found.front()));
+}
+
+std::optional<Job> JobStore::find_key(const std::string& key) {
+  SQLite::Statement row(*implementation_->database, std::string("SELECT id, ") + kColumns + " FROM job WHERE key = ?");
+  row.bind(1, key);
+  if (!row.executeStep()) return std::nullopt;
+  return read_job(row);
+}
+
+std::int64_t JobStore::last_rank() {
+  return implementation_->database->execAndGet("SELECT COALESCE(MAX(rank), 0) FROM job").getInt64();
 }
 
 }  // namespace hilbrush

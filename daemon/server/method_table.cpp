@@ -1,12 +1,15 @@
 #include "daemon/server/method_table.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "sampling/input_error.h"
 
 namespace hilbrush {
 namespace {
+
+constexpr const char* kSessionOpen = "session.open";
 
 Json object_schema(Json properties, std::vector<std::string> required) {
   return {{"type", "object"},
@@ -72,7 +75,15 @@ Json job_schema() {
       {"model_copy", nullable("string", "the model in the job's folder")},
       {"settings", typed("object", "all settings, defaults filled in")},
       {"created", typed("string", "ISO 8601, UTC")},
-      {"key", nullable("string", "idempotency key")}};
+      {"started", nullable("string", "when it was first painted")},
+      {"ended", nullable("string", "when it came to its end")},
+      {"key", nullable("string", "idempotency key")},
+      {"copies", typed("integer", "parts to paint; dots are those of the present one")},
+      {"copies_done", typed("integer", "parts that are painted")},
+      {"position", nullable("integer", "place in the queue, from 1")},
+      {"needs_part_in_place", typed("boolean", "job.start or job.resume must confirm that the part is in its place")},
+      {"timing",
+       nullable("object", "the time that Hilbrush itself adds to each dot: dots counted, own_ms median, p99")}};
   return {{"type", "object"}, {"properties", std::move(properties)}};
 }
 
@@ -107,6 +118,7 @@ MethodTable::MethodTable(JobBook& book, CellDesk& desk, AuditLog& audit, std::fu
   add_job_methods(book);
   add_cell_methods(desk);
   add_system_methods(std::move(info));
+  add_session_method();
 }
 
 void MethodTable::add_job_methods(JobBook& book) {
@@ -127,12 +139,17 @@ void MethodTable::add_job_methods(JobBook& book) {
        {"settings", typed("object", "see the job file: dpi or dots, size_mm or units_mm, ...")},
        {"dry_run", typed("boolean", "compute the whole job, open no device")},
        {"key",
-        {{"type", "string"}, {"maxLength", 200}, {"description", "idempotency key: the same key is the same job"}}}},
+        {{"type", "string"}, {"maxLength", 200}, {"description", "idempotency key: the same key is the same job"}}},
+       {"copies",
+        {{"type", "integer"},
+         {"minimum", 1},
+         {"maximum", JobBook::kCopiesMax},
+         {"description", "parts to paint, one after another; default 1"}}}},
       {"model"});
   add_act("job.submit", "Takes a model; answers at once, the job is queued.", submit_params,
           [&book](const Json& given, const Caller& caller) -> Job& {
             return book.submit({given.at("model").get<std::string>(), given.value("settings", Json::object()),
-                                given.value("dry_run", false), given.value("key", "")},
+                                given.value("dry_run", false), given.value("key", ""), given.value("copies", 1)},
                                caller.peer);
           });
   const Json part = {{"const", true}, {"description", "the operator confirms that the part is in its place"}};
@@ -147,7 +164,14 @@ void MethodTable::add_job_methods(JobBook& book) {
   add_act("job.resume", "Goes on with a paused job; the cell must be armed.",
           object_schema({{"id", id_schema()}, {"part_in_place", part}, {"in_doubt", in_doubt}}, {"id"}),
           [&book](const Json& given, const Caller&) -> Job& {
-            return book.resume(id_of(given), given.value("in_doubt", "leave") == "expose");
+            return book.resume(id_of(given), given.value("in_doubt", "leave") == "expose",
+                               given.value("part_in_place", false));
+          });
+  const Json position = {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000000}, {"description", "1: the next"}};
+  add_act("job.move", "Gives a waiting job another place in the queue.",
+          object_schema({{"id", id_schema()}, {"position", position}}, {"id", "position"}),
+          [&book](const Json& given, const Caller&) -> Job& {
+            return book.move(id_of(given), given.at("position").get<int>());
           });
   add_act("job.cancel", "Gives a job up for good.", job_params(),
           [&book](const Json& given, const Caller&) -> Job& { return book.cancel(id_of(given)); });
@@ -157,13 +181,20 @@ void MethodTable::add_job_methods(JobBook& book) {
          reply.result(job_result(book.get(id_of(given))));
        }});
   methods_.push_back(
-      {"job.list", "Jobs, the newest first.", false,
+      {"job.list", "Jobs, the newest first; or those that wait, in their order.", false,
        object_schema(
-           {{"limit", {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000}, {"description", "default 100"}}}}, {}),
+           {{"limit", {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000}, {"description", "default 100"}}},
+            {"order", {{"type", "string"}, {"enum", {"newest", "queue"}}, {"description", "default: newest"}}}},
+           {}),
        result_with("jobs", {{"type", "array"}, {"items", reference("Job")}}),
        [&book](const Json& given, const Caller&, const Reply& reply) {
          Json jobs = Json::array();
          const auto limit = given.value("limit", std::size_t{100});
+         if (given.value("order", "newest") == "queue") {
+           for (const Job* waiting : book.queue())
+             if (jobs.size() < limit) jobs.push_back(job_to_json(*waiting));
+           return reply.result({{"jobs", std::move(jobs)}});
+         }
          for (auto entry = book.jobs().rbegin(); entry != book.jobs().rend() && jobs.size() < limit; ++entry)
            jobs.push_back(job_to_json(entry->second));
          reply.result({{"jobs", std::move(jobs)}});
@@ -192,8 +223,8 @@ void MethodTable::add_cell_methods(CellDesk& desk) {
   methods_.push_back({"cell.status", "The cell's state, laser, interlock, joints and devices.", false, no_params(),
                       cell, [&desk](const Json&, const Caller&, const Reply& reply) { reply.result(desk.status()); }});
   methods_.push_back({"cell.stop", "Laser off, axes stopped, at once and latched; a painting job is paused.", true,
-                      no_params(), cell, [&desk](const Json&, const Caller& caller, const Reply& reply) {
-                        reply.result(desk.stop("stopped by user " + std::to_string(caller.peer.uid)));
+                      no_params(), cell, [&desk](const Json&, const Caller& caller, Reply reply) {
+                        desk.stop("stopped by " + caller.peer.user, std::move(reply));
                       }});
   methods_.push_back({"cell.clear", "Takes a stop back; nothing moves.", true, no_params(), cell,
                       [&desk](const Json&, const Caller&, Reply reply) { desk.clear(std::move(reply)); }});
@@ -220,6 +251,44 @@ void MethodTable::add_system_methods(std::function<Json()> info) {
                       [this](const Json&, const Caller&, const Reply& reply) { reply.result(discover()); }});
 }
 
+/// The token itself is never recorded.
+void MethodTable::add_session_method() {
+  const Json token = {{"type", "string"}, {"minLength", 1}, {"maxLength", 1000}, {"description", "a secret"}};
+  methods_.push_back({kSessionOpen, "Says who a connection over TCP is: the first request there.", false,
+                      object_schema({{"token", token}}, {"token"}),
+                      result_with("user", typed("string", "whose token it is")),
+                      [this](const Json& given, const Caller& caller, const Reply& reply) {
+                        if (!caller.identify || !caller.identify(given.at("token").get<std::string>())) {
+                          audit_.record(caller.peer, kSessionOpen, Json::object(), "refused");
+                          throw RpcFault{kRpcNotPermitted, "this token is nobody's", "$.token"};
+                        }
+                        audit_.record(caller.peer, kSessionOpen, Json::object(), "ok");
+                        reply.result({{"user", caller.peer.user}});
+                      }});
+}
+
+Right Method::right() const {
+  if (name == kSessionOpen) return Right::kNone;
+  return is_act && name != "cell.stop" ? Right::kOperate : Right::kLook;
+}
+
+namespace {
+
+std::optional<RpcFault> missing_right(const Method& method, const Peer& peer) {
+  const Right needed = method.right();
+  if (needed == Right::kNone || (needed == Right::kLook ? peer.may_look : peer.may_operate)) return std::nullopt;
+  std::string sentence;
+  if (peer.user.empty())
+    sentence = "this connection has not said who it is: session.open with a token comes first";
+  else if (needed == Right::kOperate && peer.may_look)
+    sentence = "user " + peer.user + " may look and stop the cell, but not operate it";
+  else
+    sentence = "user " + peer.user + " may not use this daemon";
+  return RpcFault{kRpcNotPermitted, sentence, ""};
+}
+
+}  // namespace
+
 void MethodTable::dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const {
   const auto method =
       std::find_if(methods_.begin(), methods_.end(), [&](const Method& known) { return known.name == request.method; });
@@ -238,6 +307,7 @@ void MethodTable::dispatch(const RpcRequest& request, const Caller& caller, Repl
       answer(std::move(fault));
     };
   }
+  if (auto fault = missing_right(*method, caller.peer)) return reply.fault(std::move(*fault));
   try {
     if (auto fault = check_schema(request.params, method->params)) return reply.fault(std::move(*fault));
     method->handler(request.params, caller, reply);

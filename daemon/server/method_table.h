@@ -16,14 +16,21 @@ namespace hilbrush {
 /// The connection a request came over.
 struct Caller {
   Peer peer;
+  /// Becomes whoever the token belongs to; false if it is nobody's, and the connection is closed after the answer.
+  std::function<bool(const std::string& token)> identify;
   std::function<void(std::int64_t job)> watch, unwatch;
 };
+
+/// What a caller must be allowed to do.
+enum class Right { kNone, kLook, kOperate };
 
 struct Method {
   std::string name, summary;
   bool is_act = false;  ///< recorded in the audit log
   Json params, result;  ///< JSON schemas
   std::function<void(const Json& params, const Caller& caller, Reply reply)> handler;
+  /// Looking needs the right to look, acts that to operate; but whoever may look may also stop the cell.
+  Right right() const;
 };
 
 class MethodTable {
@@ -41,6 +48,7 @@ class MethodTable {
   void add_job_methods(JobBook& book);
   void add_cell_methods(CellDesk& desk);
   void add_system_methods(std::function<Json()> info);
+  void add_session_method();
 
   AuditLog& audit_;
   std::vector<Method> methods_;

@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -19,6 +21,7 @@
 #include <set>
 #include <unordered_set>
 #include <utility>
+#include <vector>
 
 #include "sampling/check.h"
 
@@ -26,13 +29,19 @@ namespace hilbrush {
 namespace {
 
 namespace asio = boost::asio;
-using Stream = asio::local::stream_protocol;
+using Local = asio::local::stream_protocol;
+using Tcp = asio::ip::tcp;
+using Stream = asio::generic::stream_protocol;
 
-Peer peer_of(Stream::socket& socket) {
+Peer peer_of(Local::socket& socket, const Access& access) {
   ucred credentials{};
   socklen_t length = sizeof credentials;
   CHECK(::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &credentials, &length) == 0);
-  return {credentials.uid, credentials.gid, credentials.pid};
+  std::vector<gid_t> groups(1024);
+  length = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  if (::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERGROUPS, groups.data(), &length) != 0) length = 0;
+  groups.resize(length / sizeof(gid_t));
+  return access.local_peer(credentials.uid, credentials.gid, credentials.pid, groups);
 }
 
 /// The answers of one batch; sent as one line when the last has come.
@@ -48,16 +57,15 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   using Goodbye = std::function<void(const std::shared_ptr<Session>&)>;
 
-  Session(Stream::socket socket, const ServerLimits& limits, const MethodTable& methods, const JobBook& book,
-          Goodbye goodbye)
+  Session(Stream::socket socket, Peer peer, const ServerLimits& limits, const Services& services, Goodbye goodbye)
       : socket_(std::move(socket)),
         limits_(limits),
-        methods_(methods),
-        book_(book),
+        services_(services),
         goodbye_(std::move(goodbye)),
-        peer_(peer_of(socket_)) {}
+        peer_(std::move(peer)),
+        patience_(socket_.get_executor()) {}
 
-  void begin() { read(); }
+  void begin();
   void close();
   void notify(const Job& job);
 
@@ -68,6 +76,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void serve(std::string_view line);
   void answer(const RpcElement& element, std::function<void(std::string)> send);
   Caller caller();
+  bool identify(const std::string& token);
   bool may_serve() const { return unread_bytes() < limits_.unread_bytes && pending_replies_ < limits_.pending_replies; }
   std::size_t unread_bytes() const { return outbox_.size() + writing_.size(); }
   void send(const std::string& line);
@@ -77,10 +86,10 @@ class Session : public std::enable_shared_from_this<Session> {
 
   Stream::socket socket_;
   const ServerLimits limits_;
-  const MethodTable& methods_;
-  const JobBook& book_;
+  const Services services_;
   const Goodbye goodbye_;
-  const Peer peer_;
+  Peer peer_;
+  asio::steady_timer patience_;  ///< with a connection that has not said who it is
   std::array<char, 65536> chunk_{};
   std::string inbox_;             ///< bytes not yet served: at most a line and a chunk
   std::size_t searched_ = 0;      ///< of inbox_: holds no end of line before
@@ -89,6 +98,30 @@ class Session : public std::enable_shared_from_this<Session> {
   std::set<std::int64_t> watched_, news_;  ///< jobs; those of them that changed since they were last told
   bool is_reading_ = false, is_writing_ = false, is_at_end_ = false, is_closed_ = false, is_serving_ = false;
 };
+
+void Session::begin() {
+  if (peer_.user.empty()) {
+    patience_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+        std::chrono::duration<double>(limits_.identify_s)));
+    patience_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
+      if (const auto self = weak.lock(); self && !error && self->peer_.user.empty()) self->close();
+    });
+  }
+  read();
+}
+
+bool Session::identify(const std::string& token) {
+  const std::string address = peer_.address;
+  if (auto peer = services_.access.token_peer(token, address)) {
+    peer_ = std::move(*peer);
+    patience_.cancel();
+    return true;
+  }
+  is_at_end_ = true;  // what it sends after a wrong token is not read
+  inbox_.clear();
+  searched_ = 0;
+  return false;
+}
 
 void Session::read() {
   if (is_reading_ || is_at_end_ || is_closed_ || !may_serve()) return;
@@ -164,6 +197,10 @@ void Session::serve(std::string_view line) {
 Caller Session::caller() {
   const std::weak_ptr<Session> weak = weak_from_this();
   return {peer_,
+          [weak](const std::string& token) {
+            const auto self = weak.lock();
+            return self && self->identify(token);
+          },
           [weak](std::int64_t job) {
             if (const auto self = weak.lock()) self->watched_.insert(job);
           },
@@ -179,7 +216,7 @@ void Session::answer(const RpcElement& element, std::function<void(std::string)>
   if (const auto* fault = std::get_if<RpcFault>(&element.content)) return send(rpc_fault(element.id, *fault));
   const auto& request = std::get<RpcRequest>(element.content);
   if (request.is_notification)
-    return methods_.dispatch(request, caller(), {[](const Json&) {}, [](const RpcFault&) {}});
+    return services_.methods.dispatch(request, caller(), {[](const Json&) {}, [](const RpcFault&) {}});
   ++pending_replies_;
   const std::weak_ptr<Session> weak = weak_from_this();
   const auto finish = [weak, send = std::move(send)](const std::string& text) {
@@ -189,9 +226,9 @@ void Session::answer(const RpcElement& element, std::function<void(std::string)>
       self->serve_lines();
     }
   };
-  methods_.dispatch(request, caller(),
-                    {[finish, id = request.id](Json result) { finish(rpc_result(id, std::move(result))); },
-                     [finish, id = request.id](const RpcFault& fault) { finish(rpc_fault(id, fault)); }});
+  services_.methods.dispatch(request, caller(),
+                             {[finish, id = request.id](Json result) { finish(rpc_result(id, std::move(result))); },
+                              [finish, id = request.id](const RpcFault& fault) { finish(rpc_fault(id, fault)); }});
 }
 
 void Session::send(const std::string& line) {
@@ -228,8 +265,8 @@ void Session::notify(const Job& job) {
 void Session::tell_news() {
   if (is_writing_ || is_closed_ || is_at_end_) return;
   for (const std::int64_t id : std::exchange(news_, {})) {
-    const auto job = book_.jobs().find(id);
-    if (job != book_.jobs().end())
+    const auto job = services_.book.jobs().find(id);
+    if (job != services_.book.jobs().end())
       send(rpc_notification("job.update", {{"seq", job->second.seq}, {"job", job_to_json(job->second)}}));
   }
 }
@@ -253,31 +290,56 @@ struct Server::Implementation {
   ServerLimits limits;
   asio::io_context context{1};
   asio::executor_work_guard<asio::io_context::executor_type> work{context.get_executor()};
-  Stream::acceptor acceptor{context};
+  Local::acceptor acceptor{context};
+  Tcp::acceptor tcp_acceptor{context};
   asio::signal_set signals{context};
-  asio::steady_timer retry{context}, poll_timer{context};
+  asio::steady_timer poll_timer{context};
   std::filesystem::path socket_file;
   std::unordered_set<std::shared_ptr<Session>> sessions;
 
-  void accept(const MethodTable& methods, const JobBook& book) {
-    acceptor.async_accept([this, &methods, &book](const boost::system::error_code& error, Stream::socket socket) {
+  Peer welcome(Local::socket& socket, const Services& services) { return peer_of(socket, services.access); }
+  /// Nobody yet.
+  Peer welcome(Tcp::socket& socket, const Services&) {
+    boost::system::error_code error;
+    const auto remote = socket.remote_endpoint(error);
+    socket.set_option(Tcp::no_delay(true), error);
+    Peer peer;
+    if (!error) peer.address = remote.address().to_string() + ":" + std::to_string(remote.port());
+    return peer;
+  }
+
+  template <class Acceptor>
+  void accept(Acceptor& from, const Services& services) {
+    from.async_accept([this, &from, services](const boost::system::error_code& error, auto socket) {
       if (error == asio::error::operation_aborted) return;
       if (error) {  // out of descriptors, most likely: others will close theirs
-        retry.expires_after(std::chrono::milliseconds(100));
-        retry.async_wait([this, &methods, &book](const boost::system::error_code& aborted) {
-          if (!aborted) accept(methods, book);
+        const auto retry = std::make_shared<asio::steady_timer>(context, std::chrono::milliseconds(100));
+        retry->async_wait([this, &from, services, retry](const boost::system::error_code& aborted) {
+          if (!aborted) accept(from, services);
         });
         return;
       }
       // Beyond the limit the connection is closed at once, which the client sees.
       if (sessions.size() < limits.clients) {
+        Peer peer = welcome(socket, services);
         const auto session =
-            std::make_shared<Session>(std::move(socket), limits, methods, book,
+            std::make_shared<Session>(std::move(socket), std::move(peer), limits, services,
                                       [this](const std::shared_ptr<Session>& gone) { sessions.erase(gone); });
         sessions.insert(session);
         session->begin();
       }
-      accept(methods, book);
+      accept(from, services);
+    });
+  }
+
+  /// A tick that comes late does not bring others after it.
+  void tick(const std::shared_ptr<asio::steady_timer>& timer, std::chrono::steady_clock::duration period,
+            std::function<void()> task) {
+    timer->expires_after(period);
+    timer->async_wait([this, timer, period, task = std::move(task)](const boost::system::error_code& error) {
+      if (error) return;
+      task();
+      tick(timer, period, task);
     });
   }
 
@@ -302,7 +364,7 @@ void Server::post(std::function<void()> task) {
   asio::post(implementation_->context, std::move(task));
 }
 
-void Server::listen(const std::filesystem::path& socket, const MethodTable& methods, const JobBook& book) {
+void Server::listen(const std::filesystem::path& socket, const Services& services) {
   const auto fail = [&](const std::string& sentence) { throw std::runtime_error(socket.string() + ": " + sentence); };
   if (socket.string().size() >= sizeof(sockaddr_un::sun_path)) fail("is too long for a socket's path");
   struct stat status {};
@@ -313,19 +375,39 @@ void Server::listen(const std::filesystem::path& socket, const MethodTable& meth
   }
   auto& acceptor = implementation_->acceptor;
   boost::system::error_code error;
-  acceptor.open(Stream(), error);
+  acceptor.open(Local(), error);
   if (error) fail("no socket can be made: " + error.message());
   // Nobody may connect before the mode is as it shall be, whatever the umask: bound for nobody, opened to the group,
   // then listened on.
   const mode_t before = ::umask(0777);
-  acceptor.bind(Stream::endpoint(socket.string()), error);
+  acceptor.bind(Local::endpoint(socket.string()), error);
   ::umask(before);
   if (error) fail("can't be bound: " + error.message());
   implementation_->socket_file = socket;
   if (::chmod(socket.c_str(), 0660) != 0) fail(std::string("its mode can't be set: ") + std::strerror(errno));
   acceptor.listen(asio::socket_base::max_listen_connections, error);
   if (error) fail("can't be listened on: " + error.message());
-  implementation_->accept(methods, book);
+  implementation_->accept(acceptor, services);
+}
+
+std::uint16_t Server::listen_tcp(const std::string& host, std::uint16_t port, const Services& services) {
+  boost::system::error_code error;
+  const auto check = [&](const char* what) {
+    if (error) throw std::runtime_error(host + ":" + std::to_string(port) + ": " + what + ": " + error.message());
+  };
+  const auto address = asio::ip::make_address(host, error);
+  check("is no address");
+  auto& acceptor = implementation_->tcp_acceptor;
+  const Tcp::endpoint endpoint(address, port);
+  acceptor.open(endpoint.protocol(), error);
+  check("no socket can be made");
+  acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
+  acceptor.bind(endpoint, error);
+  check("can't be bound");
+  acceptor.listen(asio::socket_base::max_listen_connections, error);
+  check("can't be listened on");
+  implementation_->accept(acceptor, services);
+  return acceptor.local_endpoint().port();
 }
 
 void Server::notify(const Job& job) {
@@ -348,6 +430,13 @@ void Server::on_termination(std::function<void()> task) {
 
 void Server::poll(double period_s, std::function<bool()> task) {
   implementation_->poll(
+      std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s)),
+      std::move(task));
+}
+
+void Server::every(double period_s, std::function<void()> task) {
+  implementation_->tick(
+      std::make_shared<asio::steady_timer>(implementation_->context),
       std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s)),
       std::move(task));
 }

@@ -1,14 +1,16 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 
+#include "daemon/server/access.h"
 #include "daemon/server/job.h"
 #include "daemon/server/method_table.h"
 
-/// The Unix socket: JSON-RPC 2.0, one message a line. One thread; requests never wait behind work. Nobody disturbs
-/// anybody: a line is bounded, a client that does not read is not read from either, and its notifications are held as
-/// "there is news" instead of as text.
+/// The Unix socket, and a TCP one if it is wanted: JSON-RPC 2.0, one message a line. One thread; requests never wait
+/// behind work. Nobody disturbs anybody: a line is bounded, a client that does not read is not read from either, and
+/// its notifications are held as "there is news" instead of as text.
 namespace hilbrush {
 
 struct ServerLimits {
@@ -16,6 +18,14 @@ struct ServerLimits {
   std::size_t unread_bytes = std::size_t{1} << 18;  ///< of answers a client has not read, before its requests wait
   std::size_t pending_replies = 64;                 ///< of one client
   std::size_t clients = 1000;
+  double identify_s = 10;  ///< a TCP connection that has not said who it is by then is closed
+};
+
+/// What the requests of a connection are served by; all outlive the server's run.
+struct Services {
+  const MethodTable& methods;
+  const JobBook& book;
+  const Access& access;
 };
 
 class Server {
@@ -29,7 +39,9 @@ class Server {
   void post(std::function<void()> task);
   /// Mode 0660. The caller has made sure that no other daemon uses the path; what is left of a dead one is removed.
   /// @throws std::runtime_error with a sentence.
-  void listen(const std::filesystem::path& socket, const MethodTable& methods, const JobBook& book);
+  void listen(const std::filesystem::path& socket, const Services& services);
+  /// On an address of this machine; port 0 takes any free one. @return the port. @throws std::runtime_error
+  std::uint16_t listen_tcp(const std::string& host, std::uint16_t port, const Services& services);
   /// A job has changed: whoever watches it is told. Socket thread.
   void notify(const Job& job);
   std::size_t client_count() const;
@@ -38,6 +50,8 @@ class Server {
   void on_termination(std::function<void()> task);
   /// Calls `task` on the socket thread again and again until it says true.
   void poll(double period_s, std::function<bool()> task);
+  /// Calls `task` on the socket thread every `period_s`, until the end.
+  void every(double period_s, std::function<void()> task);
   /// Serves until end_run().
   void run();
   /// Any thread.

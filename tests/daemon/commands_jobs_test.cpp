@@ -40,6 +40,8 @@ TEST(JobCommands, EachSendsItsMethodAndParameters) {
       {{"resume", "7"}, R"(job.resume {"id":"7"})"},
       {{"resume", "7", "--in-doubt", "expose"}, R"(job.resume {"id":"7","in_doubt":"expose"})"},
       {{"cancel", "7"}, R"(job.cancel {"id":"7"})"},
+      {{"move", "7", "2"}, R"(job.move {"id":"7","position":2})"},
+      {{"list", "--queue"}, R"(job.list {"order":"queue"})"},
       {{"list"}, "job.list -"},
       {{"status"}, "cell.status -"},
       {{"stop"}, "cell.stop -"},
@@ -52,8 +54,27 @@ TEST(JobCommands, EachSendsItsMethodAndParameters) {
     AnsweringDaemon daemon(kJob);
     const CommandRun run = run_with(daemon, c.arguments);
     EXPECT_EQ(run.exit_code, kExitOk) << run.err;
-    EXPECT_EQ(daemon.requests(), std::vector<std::string>{c.request});
+    const auto requests = daemon.requests();
+    ASSERT_FALSE(requests.empty());
+    EXPECT_EQ(requests.back(), c.request);
+    EXPECT_EQ(requests.size(), c.arguments[0] == "resume" ? 2u : 1u) << "resume asks first whether it must ask";
   }
+}
+
+TEST(JobCommands, ResumeAsksAfterThePartOnlyWhenItMust) {
+  std::string moved = kJob;
+  const auto brace = moved.find("\"state\"");
+  ASSERT_NE(brace, std::string::npos);
+  moved.insert(brace, "\"needs_part_in_place\":true,");
+  {
+    AnsweringDaemon daemon(moved);
+    const CommandRun run = run_with(daemon, {"resume", "7"});
+    EXPECT_EQ(run.exit_code, kExitRefused);
+    EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.get {"id":"7"})"});
+  }
+  AnsweringDaemon daemon(moved);
+  EXPECT_EQ(run_with(daemon, {"resume", "7", "--part-in-place"}).exit_code, kExitOk);
+  EXPECT_EQ(daemon.requests().back(), R"(job.resume {"id":"7","part_in_place":true})");
 }
 
 TEST(JobCommands, JsonIsTheDaemonsResult) {

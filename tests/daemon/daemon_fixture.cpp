@@ -1,7 +1,9 @@
 #include "tests/daemon/daemon_fixture.h"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -84,6 +86,18 @@ LineClient::LineClient(const fs::path& socket) : fd_(::socket(AF_UNIX, SOCK_STRE
   std::strncpy(address.sun_path, socket.c_str(), sizeof address.sun_path - 1);
   if (::connect(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
     throw std::runtime_error("no daemon answers on " + socket.string() + ": " + std::strerror(errno));
+}
+
+std::unique_ptr<LineClient> LineClient::over_tcp(const std::string& address) {
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  place.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  std::unique_ptr<LineClient> client(new LineClient(fd));
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&place), sizeof place) != 0)
+    throw std::runtime_error("no daemon answers on " + address + ": " + std::strerror(errno));
+  return client;
 }
 
 LineClient::~LineClient() {
@@ -199,7 +213,7 @@ fs::path DaemonWorld::model(const std::string& name, std::size_t exposures) {
   write_file(file, text);
   ExposureProgram program = small_program(exposures);
   program.provenance = {sha256_hex(name.starts_with("stray") ? "another" : text), settings_hash(),
-                        load_cell(options.cell).sha256, "test"};
+                        load_cell(options.cell).sha256, HILBRUSH_VERSION};
   if (name.starts_with("long"))
     for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
   if (name.starts_with("wild")) program.exposures[exposures / 2].joints[kJ1] = 100;

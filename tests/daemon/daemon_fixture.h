@@ -22,6 +22,8 @@ class LineClient {
   static constexpr auto kPatience = std::chrono::seconds(30);
 
   explicit LineClient(const std::filesystem::path& socket);
+  /// Over TCP, to "127.0.0.1:PORT".
+  static std::unique_ptr<LineClient> over_tcp(const std::string& address);
   ~LineClient();
   LineClient(const LineClient&) = delete;
   LineClient& operator=(const LineClient&) = delete;
@@ -45,6 +47,7 @@ class LineClient {
   void end_sending();
 
  private:
+  explicit LineClient(int fd) : fd_(fd) {}
   int fd_ = -1;
   int last_id_ = 0;
   std::string inbox_;
@@ -61,6 +64,7 @@ class DaemonWorld {
 
   void begin();
   void end();
+  const Daemon& daemon() const { return *daemon_; }
   LineClient client() const { return LineClient(options.socket); }
   /// A model of that name that the script turns into a program of `exposures` exposures, or into the trouble that its
   /// name says: hang, crash, fat, bad, mute, garbage, endless, outside, stray (a program for another model), wild (one

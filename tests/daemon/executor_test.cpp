@@ -2,98 +2,23 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <limits>
-#include <map>
-#include <mutex>
 #include <random>
 #include <thread>
 
-#include "drivers/driver_error.h"
 #include "sim/devices/sim_cell.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/witnessed_cell.h"
 
 namespace hilbrush {
 namespace {
 
+using test::expect_painted_once;
+using test::key_of;
 using test::small_cell;
 using test::small_program;
-
-/// A simulated cell and its witness.
-class WitnessedCell {
- public:
-  explicit WitnessedCell(double time_scale = 0)
-      : description(small_cell(time_scale)), sim_(description, {.laser_start_delay_s = 0}) {
-    sim_.set_emission_sink([this](const Emission& emission) {
-      const std::lock_guard lock(mutex_);
-      emissions_.push_back(emission);
-    });
-    bring_up(sim_.cell());
-  }
-  Cell cell() { return sim_.cell(); }
-  SimCell& sim() { return sim_; }
-  std::vector<Emission> emissions() const {
-    const std::lock_guard lock(mutex_);
-    return emissions_;
-  }
-  /// What an operator does after a stop or a fault.
-  void recover(ExecutionControl& control) {
-    control.stop = false;
-    for (AxisGroup<4>* robot : {&sim_.cell().robot})
-      if (robot->status().state == DeviceState::kFault) robot->clear_fault();
-    if (sim_.cell().table.status().state == DeviceState::kFault) sim_.cell().table.clear_fault();
-    if (sim_.cell().laser.status().state == DeviceState::kFault) sim_.cell().laser.clear_fault();
-    bring_up(sim_.cell());
-  }
-
-  const CellDescription description;
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<Emission> emissions_;
-  SimCell sim_;
-};
-
-using JointsKey = std::array<long long, kAxisCount>;
-JointsKey key_of(const Joints& joints) {
-  JointsKey key{};
-  for (std::size_t i = 0; i < kAxisCount; ++i) key[i] = std::llround(joints[i] * 1e10);
-  return key;
-}
-
-/// The safety invariants, by the witness: no dot twice, all done dots once and in full, those in doubt at most once,
-/// nothing else, never in motion.
-void expect_painted_once(const ExposureProgram& program, const Journal& journal,
-                         const std::vector<Emission>& emissions) {
-  std::map<JointsKey, std::vector<Emission>> by_pose;
-  for (const auto& emission : emissions) {
-    EXPECT_FALSE(emission.is_moving) << "light in motion at " << emission.start_s << " s";
-    by_pose[key_of(emission.joints)].push_back(emission);
-  }
-  for (std::size_t i = 0; i < program.exposures.size(); ++i) {
-    const auto found = by_pose.find(key_of(program.exposures[i].joints));
-    const std::size_t count = found == by_pose.end() ? 0 : found->second.size();
-    switch (journal.state(i)) {
-      case ExposureState::kDone:
-        ASSERT_EQ(count, 1u) << "exposure " << i;
-        EXPECT_DOUBLE_EQ(found->second[0].length_s, static_cast<double>(program.exposures[i].pulse_s))
-            << "exposure " << i;
-        EXPECT_DOUBLE_EQ(found->second[0].power_w, static_cast<double>(program.exposures[i].power_w))
-            << "exposure " << i;
-        break;
-      case ExposureState::kInDoubt:
-        ASSERT_LE(count, 1u) << "exposure " << i;
-        break;
-      default:
-        ASSERT_EQ(count, 0u) << "exposure " << i;
-    }
-    if (found != by_pose.end()) by_pose.erase(found);
-  }
-  EXPECT_TRUE(by_pose.empty()) << by_pose.size() << " emissions belong to no exposure";
-}
+using test::WitnessedCell;
 
 TEST(ExecutorTest, PaintsEveryDotOnce) {
   WitnessedCell world;
@@ -284,113 +209,6 @@ TEST(ExecutorTest, RefusesWhatIsOutsideTheLimits) {
   expect_refused("pulse", [](ExposureProgram& program) { program.exposures[10].pulse_s = 1; });
   expect_refused("no pulse",
                  [nan](ExposureProgram& program) { program.exposures[10].pulse_s = static_cast<float>(nan); });
-}
-
-/// Which call of which device fails, counted from one; or, for the laser's off, goes unconfirmed.
-struct ScriptedFault {
-  enum class Where {
-    kRobotMove,
-    kTableMove,
-    kRobotStatus,
-    kTableStatus,
-    kArrival,
-    kFire,
-    kLaserStatus,
-    kOffUnconfirmed
-  } where;
-  int countdown = 0;
-
-  bool strikes(Where here) { return here == where && --countdown == 0; }
-  void strike(Where here) {
-    if (strikes(here)) throw DriverError("the device does not answer");
-  }
-};
-using Where = ScriptedFault::Where;
-
-template <std::size_t N>
-class FaultyAxes final : public AxisGroup<N> {
- public:
-  FaultyAxes(AxisGroup<N>& axes, ScriptedFault& fault) : axes_(axes), fault_(fault) {}
-  void connect() override { axes_.connect(); }
-  void enable() override { axes_.enable(); }
-  void home() override { axes_.home(); }
-  void disable() noexcept override { axes_.disable(); }
-  void clear_fault() override { axes_.clear_fault(); }
-  void move_to(const typename AxisGroup<N>::Positions& target, double settle_s) override {
-    fault_.strike(N == 4 ? Where::kRobotMove : Where::kTableMove);
-    axes_.move_to(target, settle_s);
-  }
-  typename AxisGroup<N>::Status status() override {
-    fault_.strike(N == 4 ? Where::kRobotStatus : Where::kTableStatus);
-    return axes_.status();
-  }
-  double expected_arrival_s() override {
-    fault_.strike(Where::kArrival);
-    return axes_.expected_arrival_s();
-  }
-  void stop() noexcept override { axes_.stop(); }
-
- private:
-  AxisGroup<N>& axes_;
-  ScriptedFault& fault_;
-};
-
-class FaultyLaser final : public Laser {
- public:
-  FaultyLaser(Laser& laser, ScriptedFault& fault) : laser_(laser), fault_(fault) {}
-  void connect() override { laser_.connect(); }
-  Limits limits() override { return laser_.limits(); }
-  void enable() override { laser_.enable(); }
-  void disable() noexcept override { laser_.disable(); }
-  void fire(double power_w, double pulse_s) override {
-    fault_.strike(Where::kFire);
-    laser_.fire(power_w, pulse_s);
-  }
-  bool off() noexcept override {
-    const bool is_off = laser_.off();
-    return is_off && !fault_.strikes(Where::kOffUnconfirmed);
-  }
-  Status status() override {
-    fault_.strike(Where::kLaserStatus);
-    return laser_.status();
-  }
-  void clear_fault() override { laser_.clear_fault(); }
-
- private:
-  Laser& laser_;
-  ScriptedFault& fault_;
-};
-
-TEST(ExecutorTest, ADeviceThatFailsAnywhereLeavesTheCellDarkAndAtMostOneDotInDoubt) {
-  for (const Where where : {Where::kRobotMove, Where::kTableMove, Where::kRobotStatus, Where::kTableStatus,
-                            Where::kArrival, Where::kFire, Where::kLaserStatus, Where::kOffUnconfirmed}) {
-    for (int call = 1; call <= 40; ++call) {
-      SCOPED_TRACE("place " + std::to_string(static_cast<int>(where)) + ", call " + std::to_string(call));
-      WitnessedCell world;
-      const auto program = small_program(60);
-      Journal journal = Journal::in_memory(60);
-      ExecutionControl control;
-      ScriptedFault fault{where, call};
-      const Cell inner = world.cell();
-      FaultyAxes<4> robot(inner.robot, fault);
-      FaultyAxes<2> table(inner.table, fault);
-      FaultyLaser laser(inner.laser, fault);
-      const auto result = execute(program, {}, {robot, table, laser, inner.clock}, world.description, journal, control);
-      if (result.outcome == ExecutionOutcome::kFinished) {
-        EXPECT_GT(fault.countdown, 0);
-        continue;
-      }
-      EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
-      EXPECT_FALSE(result.is_program_at_fault);
-      EXPECT_FALSE(result.reason.empty());
-      EXPECT_FALSE(inner.laser.status().is_emitting);
-      EXPECT_LE(journal.in_doubt().size(), 1u);
-      world.recover(control);
-      const auto rest = execute(program, {}, inner, world.description, journal, control);
-      ASSERT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
-      expect_painted_once(program, journal, world.emissions());
-    }
-  }
 }
 
 TEST(ExecutorTest, AFaultReportedByADeviceIsToldInItsWords) {

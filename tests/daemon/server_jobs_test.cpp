@@ -115,7 +115,8 @@ TEST(ServerJobsTest, StopsPausesAndResumesUntilEveryDotIsPaintedOnce) {
     operator_a.result("cell.clear");
     EXPECT_EQ(operator_a.error_code("job.resume", named(id)), kRpcWrongState) << "idle: arm first";
     operator_a.result("cell.arm");
-    EXPECT_EQ(operator_a.result("job.resume", named(id)).at("job").at("state"), "painting");
+    EXPECT_EQ(operator_a.error_code("job.resume", named(id)), kRpcWrongState) << "stopped since: confirm the part";
+    EXPECT_EQ(operator_a.result("job.resume", placed(id)).at("job").at("state"), "painting");
   }
   operator_a.result("job.pause", named(id));
   world.wait_for(operator_a, id, "paused");
@@ -154,13 +155,13 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
     job = world.wait_for(client, id, "paused");
     if (job.at("dots").at("in_doubt").get<int>() > 0) break;
     world.clear_and_arm(client);
-    client.result("job.resume", named(id));
+    client.result("job.resume", placed(id));
   }
   ASSERT_EQ(job.at("in_doubt").size(), 1u);
   const auto doubtful = job.at("in_doubt")[0].get<std::size_t>();
   world.clear_and_arm(client);
   EXPECT_EQ(client.error_code("job.resume", {{"id", id}, {"in_doubt", "perhaps"}}), kRpcBadParams);
-  client.result("job.resume", {{"id", id}, {"in_doubt", "expose"}});
+  client.result("job.resume", {{"id", id}, {"in_doubt", "expose"}, {"part_in_place", true}});
   job = world.wait_for(client, id, "done");
   EXPECT_EQ(job.at("dots").at("exposed"), 2000);
   EXPECT_EQ(job.at("dots").at("in_doubt"), 0);
@@ -184,7 +185,7 @@ TEST(ServerJobsTest, AStopWhileTheWayIsPlannedLeavesTheJobResumable) {
   client.result("cell.stop");
   EXPECT_EQ(client.result("job.get", named(id)).at("job").at("state"), "paused");
   world.clear_and_arm(client);
-  EXPECT_EQ(client.result("job.resume", named(id)).at("job").at("state"), "painting");
+  EXPECT_EQ(client.result("job.resume", placed(id)).at("job").at("state"), "painting");
   while (client.result("job.get", named(id)).at("job").at("stage") != "approach") std::this_thread::yield();
   EXPECT_EQ(client.result("job.pause", named(id)).at("job").at("state"), "paused");
   EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "armed");
@@ -318,7 +319,8 @@ TEST(ServerJobsTest, JobsSurviveARestart) {
   EXPECT_GE(job.at("dots").at("exposed").get<int>(), 100);
   EXPECT_LE(job.at("dots").at("in_doubt").get<int>(), 1);
   world.clear_and_arm(client);
-  client.result("job.resume", {{"id", painting}, {"in_doubt", "leave"}});
+  EXPECT_EQ(client.error_code("job.resume", named(painting)), kRpcWrongState) << "the part must be confirmed again";
+  client.result("job.resume", {{"id", painting}, {"in_doubt", "leave"}, {"part_in_place", true}});
   const Json end = world.wait_for(client, painting, "done");
   EXPECT_EQ(end.at("dots").at("exposed").get<int>() + end.at("dots").at("in_doubt").get<int>(), 2000);
   for (const std::size_t count : emission_counts(world.job_folder(painting))) EXPECT_LE(count, 1u);

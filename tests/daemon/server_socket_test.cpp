@@ -139,7 +139,7 @@ TEST(ServerSocketTest, ManyIdleClientsAndOneThatNeverReadsDisturbNobody) {
   EXPECT_EQ(client.result("cell.stop").at("cell").at("laser"), "off");
   world.wait_for(client, id, "paused");
   world.clear_and_arm(client);
-  client.result("job.resume", {{"id", id}});
+  client.result("job.resume", {{"id", id}, {"part_in_place", true}});
   world.wait_for(client, id, "done");
 }
 
@@ -268,8 +268,9 @@ TEST(ServerSocketTest, DiscoverListsExactlyWhatIsServed) {
     for (const auto& param : method.at("params")) EXPECT_TRUE(param.at("schema").is_object()) << name;
   }
   EXPECT_EQ(names, (std::set<std::string>{"job.submit", "job.list", "job.get", "job.start", "job.pause", "job.resume",
-                                          "job.cancel", "job.watch", "job.unwatch", "cell.status", "cell.stop",
-                                          "cell.clear", "cell.arm", "cell.home", "system.info", "rpc.discover"}));
+                                          "job.move", "job.cancel", "job.watch", "job.unwatch", "cell.status",
+                                          "cell.stop", "cell.clear", "cell.arm", "cell.home", "system.info",
+                                          "rpc.discover", "session.open"}));
 }
 
 TEST(ServerSocketTest, TheCellIsClearedArmedAndHomedInThreeActs) {

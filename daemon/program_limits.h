@@ -1,0 +1,22 @@
+#pragma once
+#include <cstddef>
+#include <stdexcept>
+
+#include "drivers/laser.h"
+#include "planner/exposure_program.h"
+
+/// Limits looked at again just before they matter, whatever the planner said. Pure functions, any thread.
+namespace hilbrush {
+
+/// The program asks for something outside the limits: no device is to blame.
+struct ProgramRefused : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+bool is_within_limits(const CellDescription& cell, const Joints& target);
+/// @throws ProgramRefused naming the axis; `exposure` is named in the sentence.
+void check_pose(const CellDescription& cell, const Joints& target, std::size_t exposure);
+/// @throws ProgramRefused
+void check_pulse(const Laser::Limits& limits, const Exposure& exposure, std::size_t i);
+
+}  // namespace hilbrush

@@ -1,0 +1,274 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <deque>
+#include <random>
+
+#include "tests/daemon/faulty_cell.h"
+#include "tests/daemon/witnessed_cell.h"
+
+/// Everything that can go wrong, at every place and at every phase of a dot, under virtual time.
+namespace hilbrush {
+namespace {
+
+using test::expect_painted_once;
+using test::Fault;
+using test::FaultyAxes;
+using test::FaultyLaser;
+using test::JumpingClock;
+using test::Kind;
+using test::Place;
+using test::small_program;
+using test::WitnessedCell;
+
+/// Runs the program on a cell with one fault, then on one without; whatever the first run came to, the witness must
+/// agree with the journal, and the rest must be painted. False if the fault never struck.
+bool survives(Place place, Kind kind, int call, const ExposureProgram& program) {
+  WitnessedCell world;
+  const std::size_t count = program.exposures.size();
+  Journal journal = Journal::in_memory(count);
+  ExecutionControl control;
+  Fault fault;
+  fault.place = place;
+  fault.kind = kind;
+  fault.countdown = call;
+  const Cell inner = world.cell();
+  fault.open_interlock = [&] { world.sim().set_interlock_closed(false); };
+  fault.stop = [&] { request_stop(inner, control); };
+  FaultyAxes<4> robot(inner.robot, fault);
+  FaultyAxes<2> table(inner.table, fault);
+  FaultyLaser laser(inner.laser, fault);
+  JumpingClock clock(inner.clock, fault);
+  const auto result = execute(program, {}, {robot, table, laser, clock}, world.description, journal, control);
+  if (!fault.has_struck) return false;
+  EXPECT_FALSE(inner.laser.status().is_emitting);
+  EXPECT_LE(journal.in_doubt().size(), 1u);
+  EXPECT_EQ(result.outcome != ExecutionOutcome::kFinished, !result.reason.empty()) << result.reason;
+  EXPECT_FALSE(result.is_program_at_fault);
+  world.sim().set_interlock_closed(true);
+  world.recover(control);
+  const auto rest = execute(program, {}, inner, world.description, journal, control);
+  EXPECT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
+  EXPECT_EQ(journal.done_count() + journal.in_doubt().size(), count);
+  expect_painted_once(program, journal, world.emissions());
+  return true;
+}
+
+TEST(ExecutorFaultsTest, EveryKindAtEveryPlaceAndPhaseOfADot) {
+  const auto program = small_program(60);  // with a table move after fifty
+  int struck = 0;
+  for (const Place place : test::kPlaces)
+    for (const Kind kind : test::kKinds)
+      for (int call = 1; call <= 24; ++call) {
+        SCOPED_TRACE("place " + std::to_string(static_cast<int>(place)) + ", kind " +
+                     std::to_string(static_cast<int>(kind)) + ", call " + std::to_string(call));
+        struck += survives(place, kind, call, program);
+        if (::testing::Test::HasFailure()) return;
+      }
+  EXPECT_GT(struck, 2500);
+  RecordProperty("faults", struck);
+}
+
+TEST(ExecutorFaultsTest, RandomFaultsLaterInTheRun) {
+  const bool is_long = std::getenv("HILBRUSH_LONG") != nullptr;
+  const auto program = small_program(120);
+  int struck = 0;
+  for (unsigned seed = 1; seed <= (is_long ? 200000u : 2000u); ++seed) {
+    std::mt19937 random(seed);
+    const Place place = test::kPlaces[random() % std::size(test::kPlaces)];
+    const Kind kind = test::kKinds[random() % std::size(test::kKinds)];
+    const int call = 1 + static_cast<int>(random() % 400);
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    struck += survives(place, kind, call, program);
+    if (::testing::Test::HasFailure()) return;
+  }
+  RecordProperty("faults", struck);
+  EXPECT_GT(struck, 500);
+}
+
+TEST(ExecutorFaultsTest, ALateAcknowledgementOfAPulseLeavesItsDotInDoubt) {
+  WitnessedCell world;
+  const auto program = small_program(20);
+  Journal journal = Journal::in_memory(20);
+  ExecutionControl control;
+  Fault fault;
+  fault.place = Place::kFire;
+  fault.kind = Kind::kThrowsLate;
+  fault.countdown = 8;
+  FaultyLaser laser(world.cell().laser, fault);
+  const auto result = execute(program, {}, {world.cell().robot, world.cell().table, laser, world.cell().clock},
+                              world.description, journal, control);
+  EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
+  EXPECT_EQ(journal.in_doubt(), std::vector<std::size_t>{7});
+  EXPECT_EQ(journal.done_count(), 7u);
+}
+
+TEST(ExecutorFaultsTest, AStaleInPositionIsNotBelieved) {
+  WitnessedCell world;
+  const auto program = small_program(40);
+  Journal journal = Journal::in_memory(40);
+  ExecutionControl control;
+  Fault fault;
+  fault.place = Place::kRobotMove;
+  fault.kind = Kind::kStalePosition;
+  fault.countdown = 10;
+  FaultyAxes<4> robot(world.cell().robot, fault);
+  const auto result = execute(program, {}, {robot, world.cell().table, world.cell().laser, world.cell().clock},
+                              world.description, journal, control);
+  EXPECT_TRUE(fault.has_struck);
+  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  expect_painted_once(program, journal, world.emissions());
+}
+
+TEST(ExecutorFaultsTest, AnAxisThatStandsElsewhereIsAFaultAndSaysSo) {
+  WitnessedCell world;
+  const auto program = small_program(40);
+  Journal journal = Journal::in_memory(40);
+  ExecutionControl control;
+  Fault fault;
+  fault.place = Place::kTableStatus;
+  fault.kind = Kind::kElsewhere;
+  fault.countdown = 30;
+  FaultyAxes<2> table(world.cell().table, fault);
+  const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
+                              world.description, journal, control);
+  EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
+  EXPECT_NE(result.reason.find("the table says that it is in position but stands elsewhere"), std::string::npos)
+      << result.reason;
+  expect_painted_once(program, journal, world.emissions());
+}
+
+/// A robot that takes way-points ahead, made of one that does not: the next move begins when the one before has ended.
+class BufferingRobot final : public Robot {
+ public:
+  BufferingRobot(Robot& robot, std::size_t look_ahead) : robot_(robot), look_ahead_(look_ahead) {}
+  void connect() override { robot_.connect(); }
+  void enable() override { robot_.enable(); }
+  void home() override { robot_.home(); }
+  void disable() noexcept override { robot_.disable(); }
+  void clear_fault() override { robot_.clear_fault(); }
+  std::size_t look_ahead() const override { return look_ahead_; }
+  void prepare(const Positions&, double) override {
+    EXPECT_TRUE(waiting_.empty()) << "a set-point is prepared only at rest";
+    ++prepared;
+  }
+  void move_to(const Positions& target, double settle_s) override {
+    if (!go_on()) {
+      if (waiting_.size() >= look_ahead_) throw DriverError("the robot's queue is full");
+      waiting_.emplace_back(target, settle_s);
+      most_waiting = std::max(most_waiting, waiting_.size());
+      return;
+    }
+    robot_.move_to(target, settle_s);
+  }
+  Status status() override {
+    const bool is_last = go_on() || waiting_.empty();
+    Status status = robot_.status();
+    status.in_position = status.in_position && is_last && waiting_.empty();
+    return status;
+  }
+  double expected_arrival_s() override { return robot_.expected_arrival_s(); }
+  void stop() noexcept override {
+    waiting_.clear();
+    robot_.stop();
+  }
+  std::size_t most_waiting = 0, prepared = 0;
+
+ private:
+  /// True if nothing is under way any more.
+  bool go_on() {
+    while (!waiting_.empty() && robot_.status().in_position) {
+      const auto [target, settle_s] = waiting_.front();
+      waiting_.pop_front();
+      robot_.move_to(target, settle_s);
+    }
+    return waiting_.empty() && robot_.status().state == DeviceState::kReady;
+  }
+
+  Robot& robot_;
+  const std::size_t look_ahead_;
+  std::deque<std::pair<Positions, double>> waiting_;
+};
+
+/// Every tenth exposure is approached over three way-points of the arm alone, then one of the table.
+ExposureProgram roundabout_program(std::size_t count) {
+  ExposureProgram program = small_program(count);
+  program.vias.clear();
+  for (std::size_t i = 10; i < count; i += 10) {
+    const auto at = static_cast<std::uint32_t>(i);
+    Joints joints = program.exposures[i - 1].joints;
+    for (int step = 0; step < 3; ++step) {
+      joints[kJ3] += .02;
+      program.vias.push_back({at, joints});
+    }
+    joints[kTilt] = program.exposures[i].joints[kTilt];
+    joints[kRotation] = program.exposures[i].joints[kRotation] + .2;
+    program.vias.push_back({at, joints});
+  }
+  return program;
+}
+
+TEST(ExecutorTest, HandsWayPointsAheadWhereOneChainMovesAlone) {
+  const auto program = roundabout_program(100);
+  double elapsed_s[2] = {};
+  for (const std::size_t look_ahead : {0u, 2u}) {
+    WitnessedCell world;
+    Journal journal = Journal::in_memory(100);
+    ExecutionControl control;
+    BufferingRobot robot(world.cell().robot, look_ahead);
+    const auto result = execute(program, {}, {robot, world.cell().table, world.cell().laser, world.cell().clock},
+                                world.description, journal, control);
+    ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+    EXPECT_EQ(robot.most_waiting, look_ahead);
+    EXPECT_GT(robot.prepared, 80u);
+    expect_painted_once(program, journal, world.emissions());
+    elapsed_s[look_ahead / 2] = result.elapsed_s;
+  }
+  EXPECT_NEAR(elapsed_s[0], elapsed_s[1], .05 * elapsed_s[0]) << "the same way";
+}
+
+TEST(ExecutorTest, AStopForgetsWhatWasHandedAhead) {
+  const auto program = roundabout_program(60);
+  for (int call = 1; call < 200; call += 3) {
+    SCOPED_TRACE(call);
+    WitnessedCell world;
+    Journal journal = Journal::in_memory(60);
+    ExecutionControl control;
+    Fault fault;
+    fault.place = Place::kSleep;
+    fault.kind = Kind::kStop;
+    fault.countdown = call;
+    const Cell inner = world.cell();
+    BufferingRobot robot(inner.robot, 4);
+    JumpingClock clock(inner.clock, fault);
+    const Cell cell{robot, inner.table, inner.laser, clock};
+    fault.stop = [&] { request_stop(cell, control); };
+    const auto result = execute(program, {}, cell, world.description, journal, control);
+    if (!fault.has_struck) break;
+    EXPECT_EQ(result.outcome, ExecutionOutcome::kStopped);
+    const auto stopped_at = world.sim().joints();
+    inner.clock.sleep_until(inner.clock.now_s() + 10);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      EXPECT_NEAR(world.sim().joints()[axis], stopped_at[axis], .5) << "it goes on moving";
+    EXPECT_TRUE(robot.status().state == DeviceState::kReady);
+    world.recover(control);
+    const auto rest = execute(program, {}, cell, world.description, journal, control);
+    ASSERT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
+    expect_painted_once(program, journal, world.emissions());
+  }
+}
+
+TEST(ExecutorTest, CountsItsOwnTimeOfEachDot) {
+  WitnessedCell world(1);  // real time
+  const auto program = small_program(20);
+  Journal journal = Journal::in_memory(20);
+  ExecutionControl control;
+  const auto result = execute(program, {}, world.cell(), world.description, journal, control);
+  ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  EXPECT_EQ(result.own_time.count(), 20u);
+  EXPECT_GT(result.own_time.quantile_s(.5), 0);
+  EXPECT_LT(result.own_time.quantile_s(.5), .02) << "the moves take more than twice as long";
+}
+
+}  // namespace
+}  // namespace hilbrush
