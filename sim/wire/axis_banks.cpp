@@ -363,18 +363,18 @@ ModbusOutcome LeadshineBank::write(std::uint16_t address, std::span<const std::u
   return ModbusOutcome::kDone;
 }
 
-/// Speed in rpm of an output shaft whose turn is 2 pi rad; accelerations as the milliseconds that 1000 rpm take.
+/// Speed in rpm of the motor; accelerations as the milliseconds in which its speed changes by 1000 rpm.
 bool LeadshineBank::trigger(std::uint16_t code) {
   if (code == 0x40) {
     drive_.stop();
     return true;
   }
   if (drive_.alarm() != 0) return false;
-  const double turn = 2 * 3.14159265358979323846 * drive_.steps_per_unit();
-  const double speed = path_[3] / 60. * turn;
+  constexpr double kTurn = kLeadshineStepsPerTurn;
+  const double speed = path_[3] / 60. * kTurn;
   const double ramp_ms = std::max<double>({1, static_cast<double>(path_[4]), static_cast<double>(path_[5])});
-  const double acceleration = 1000. / 60 * turn / (ramp_ms * 1e-3);
-  if (code == 0x20) return drive_.move(drive_.steps(drive_.home()), speed > 0 ? speed : turn / 4, acceleration);
+  const double acceleration = 1000. / 60 * kTurn / (ramp_ms * 1e-3);
+  if (code == 0x20) return drive_.move(drive_.steps(drive_.home()), speed > 0 ? speed : kTurn / 4, acceleration);
   if (code != 0x10) return false;
   auto target = static_cast<std::int32_t>(static_cast<std::uint32_t>(path_[1]) << 16 | path_[2]);
   if (path_[0] == 0x41)

@@ -103,6 +103,9 @@ class Cia402Bank final : public DriveBank {
   std::uint32_t speed_ = 0, acceleration_ = 0, deceleration_ = 0;
 };
 
+/// Of the motor, as the drive is set.
+inline constexpr double kLeadshineStepsPerTurn = 10'000;
+
 /// Leadshine iDM/EL in PR mode, path 0. Two words a value, the high one first.
 class LeadshineBank final : public DriveBank {
  public:

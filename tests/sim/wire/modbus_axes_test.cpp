@@ -208,7 +208,7 @@ TEST(LeadshineTest, OneMoveByPathZero) {
   const auto line = world.converse(Conversation::kTableRtu);
   const auto rtu = [&](const std::string& hex) { return body(world.ask(*line, with_crc(hex))); };
   EXPECT_EQ(rtu("02 03 10 03 00 01"), "02 03 02 00 72");
-  EXPECT_EQ(rtu("02 10 62 00 00 06 0C 00 01 00 01 86 A0 00 1E 00 64 00 64"), "02 10 62 00 00 06");
+  EXPECT_EQ(rtu("02 10 62 00 00 06 0C 00 01 00 01 86 A0 02 58 00 64 00 64"), "02 10 62 00 00 06");
   EXPECT_EQ(rtu("02 06 60 02 00 10"), "02 06 60 02 00 10");
   EXPECT_EQ(rtu("02 03 10 03 00 01"), "02 03 02 00 46") << "running";
   world.pass(5);

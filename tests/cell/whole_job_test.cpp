@@ -1,0 +1,36 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sim/film/beam.h"
+#include "tests/cell/wired_world.h"
+#include "tests/cell/witness.h"
+
+namespace hilbrush {
+namespace {
+
+using test::broken_invariants;
+using test::small_job;
+using test::WiredWorld;
+
+TEST(WholeJobTest, ASmallProgramThroughTheRealDrivers) {
+  WiredWorld world(WiredWorld::quick(.05));
+  const ExposureProgram program = small_job(world.description, 60);
+  ExecutionControl control;
+  world.recover(control);
+  Journal journal = Journal::in_memory(program.exposures.size());
+  const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
+  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  EXPECT_EQ(result.exposed, 60u);
+  EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
+  // Where the light was, by the simulated cell's own kinematics.
+  const auto emissions = world.emissions();
+  for (std::size_t i = 0; i < std::min(emissions.size(), program.exposures.size()); ++i) {
+    const auto real = beam_from_joints(world.description, emissions[i].joints).focus_O;
+    const auto wanted = beam_from_joints(world.description, program.exposures[i].joints).focus_O;
+    EXPECT_LT((real - wanted).norm(), 10e-6) << "exposure " << i;
+  }
+}
+
+}  // namespace
+}  // namespace hilbrush

@@ -1,0 +1,114 @@
+#include "tests/cell/wired_world.h"
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "config/cell_file.h"
+#include "config/json_reader.h"
+#include "config/wired_cell_file.h"
+#include "drivers/driver_error.h"
+
+namespace hilbrush::test {
+namespace {
+
+std::string shipped_text() {
+  constexpr std::size_t kCellBytesMax = 1u << 20;
+  return read_text_file(find_cell("default").string(), kCellBytesMax);
+}
+
+}  // namespace
+
+CellDescription shipped_cell() {
+  return cell_from_json(shipped_text(), "default");
+}
+
+WireOptions WiredWorld::quick(double time_scale, double start_delay_s) {
+  WireOptions options;
+  options.time_scale = time_scale;
+  options.start_delay_s = start_delay_s;
+  return options;
+}
+
+WiredWorld::WiredWorld(const WireOptions& options)
+    : wire_(shipped_cell(), options),
+      cell_file_(folder_.write("cell.json", wired_cell_text(shipped_text(), wire_.endpoints(), options.time_scale))),
+      description(load_cell(cell_file_)) {
+  wire_.set_emission_sink([this](const Emission& emission) {
+    const std::lock_guard lock(mutex_);
+    emissions_.push_back(emission);
+  });
+  reconnect();
+}
+
+void WiredWorld::reconnect() {
+  devices_.reset();
+  devices_ = make_cell_devices(description, cell_file_);
+}
+
+void WiredWorld::recover(ExecutionControl& control, int attempts) {
+  control.stop = false;
+  for (;;) {
+    try {
+      const Cell devices = cell();
+      const auto clear = [](auto& device) {
+        if (device.status().state == DeviceState::kFault) device.clear_fault();
+      };
+      clear(devices.laser);
+      clear(devices.robot);
+      clear(devices.table);
+      bring_up(devices);
+      return;
+    } catch (const DriverError&) {
+      if (--attempts <= 0) throw;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+}
+
+std::vector<Emission> WiredWorld::emissions() const {
+  const std::lock_guard lock(mutex_);
+  return emissions_;
+}
+
+ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsigned seed, std::size_t table_every) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> step(-.004, .004);
+  Joints home;
+  for (std::size_t i = 0; i < kAxisCount; ++i) home[i] = cell.axes[i].home;
+  ExposureProgram program;
+  program.provenance = {std::string(64, 'a'), std::string(64, 'b'), cell.sha256, "test"};
+  program.pitch_m = 254e-6;
+  Joints at = home;
+  at[kJ3] = .2;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0 && i % table_every == 0) {
+      at[kJ3] = .22;
+      program.vias.push_back({static_cast<std::uint32_t>(i), at});
+      at[kRotation] += .1 * (i / table_every % 2 == 0 ? 1 : -1);
+      at[kTilt] = .02 * static_cast<double>(i / table_every % 5);
+      program.vias.push_back({static_cast<std::uint32_t>(i), at});
+      at[kJ3] = .2;
+    }
+    for (const int axis : {kJ1, kJ2, kJ4}) {
+      const auto k = static_cast<std::size_t>(axis);
+      at[k] = std::clamp(at[k] + step(random), home[k] - .2, home[k] + .2);
+    }
+    at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .15, .21);
+    Exposure exposure;
+    exposure.position_O = {1e-3 * static_cast<double>(i % 100), 1e-3 * static_cast<double>(i / 100), .05};
+    exposure.normal_O = {0, 0, 1};
+    exposure.tone = .5f;
+    exposure.power_w = .01f;
+    exposure.pulse_s = .005f;
+    exposure.energy_j = exposure.power_w * exposure.pulse_s;
+    exposure.joints = at;
+    exposure.dot_index = static_cast<std::uint32_t>(i);
+    program.exposures.push_back(exposure);
+  }
+  program.vias.push_back({static_cast<std::uint32_t>(count), home});
+  return program;
+}
+
+}  // namespace hilbrush::test
