@@ -8,7 +8,6 @@
 #include <span>
 #include <string>
 
-#include "sampling/images/image_file.h"
 #include "sampling/plot.h"
 #include "sim/film/canvas.h"
 #include "sim/film/orthographic_view.h"
@@ -99,7 +98,7 @@ struct PlanDrawing {
     };
     for (const Exposure& exposure : plan.program.exposures) mark(exposure.dot_index, kExposed, mark_radius);
     for (const SkippedDot& skipped : plan.skipped)
-      mark(skipped.dot_index, kReasonColors[static_cast<std::size_t>(skipped.reason)], std::max(mark_radius, 1));
+      mark(skipped.dot_index, skip_reason_color(skipped.reason), std::max(mark_radius, 1));
   }
 
   void incidence(const ViewSheet& view, Canvas& canvas, int left, int top) const {
@@ -158,7 +157,28 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
   }
 }
 
-Canvas planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const Plan& plan) {
+/// Curves of the time so far, by what it was spent on.
+Plot time_plot(const CellDescription& cell, const ExposureProgram& program) {
+  constexpr std::size_t kMostPoints = 400;
+  const std::size_t step = std::max<std::size_t>(1, program.exposures.size() / kMostPoints);
+  std::array<PlotSeries, 5> series{{{"in all", {}}, {"move", {}}, {"settle", {}}, {"expose", {}}, {"retract", {}}}};
+  estimate_time(cell, program, [&](std::size_t exposure, const TimeSplit& so_far) {
+    if (exposure % step != 0 && exposure + 1 != program.exposures.size()) return;
+    const auto x = static_cast<double>(exposure + 1);
+    const std::array<double, 5> seconds{so_far.total_s(), so_far.move_s, so_far.settle_s, so_far.expose_s,
+                                        so_far.retract_s};
+    for (std::size_t k = 0; k < series.size(); ++k) series[k].points.emplace_back(x, seconds[k]);
+  });
+  return {"Where the time goes", "exposures", "seconds so far", false, false, 0., {}, {series.begin(), series.end()}};
+}
+
+}  // namespace
+
+Color skip_reason_color(SkipReason reason) {
+  return kReasonColors[static_cast<std::size_t>(reason)];
+}
+
+Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const Plan& plan) {
   const auto [low, high] = bounds(mesh);
   const double pixel_m = (high - low).maxCoeff() / kViewPixels;
   const PlanDrawing drawing{dots, plan, std::clamp(static_cast<int>(dots.pitch_m / pixel_m / 2), 0, kViewPixels / 20)};
@@ -192,31 +212,14 @@ Canvas planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const P
     }
     write_legend(canvas, static_cast<Row>(row), top + kText + kPad + height + kPad, plan);
   }
-  return canvas;
+  return canvas.picture();
 }
-
-/// Curves of the time so far, by what it was spent on.
-Plot time_plot(const CellDescription& cell, const ExposureProgram& program) {
-  constexpr std::size_t kMostPoints = 400;
-  const std::size_t step = std::max<std::size_t>(1, program.exposures.size() / kMostPoints);
-  std::array<PlotSeries, 5> series{{{"in all", {}}, {"move", {}}, {"settle", {}}, {"expose", {}}, {"retract", {}}}};
-  estimate_time(cell, program, [&](std::size_t exposure, const TimeSplit& so_far) {
-    if (exposure % step != 0 && exposure + 1 != program.exposures.size()) return;
-    const auto x = static_cast<double>(exposure + 1);
-    const std::array<double, 5> seconds{so_far.total_s(), so_far.move_s, so_far.settle_s, so_far.expose_s,
-                                        so_far.retract_s};
-    for (std::size_t k = 0; k < series.size(); ++k) series[k].points.emplace_back(x, seconds[k]);
-  });
-  return {"Where the time goes", "exposures", "seconds so far", false, false, 0., {}, {series.begin(), series.end()}};
-}
-
-}  // namespace
 
 std::vector<std::filesystem::path> write_planning_pictures(const TexturedMesh& mesh, const DotSequence& dots,
                                                            const Plan& plan, const CellDescription& cell,
                                                            const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files{folder / "planning.png"};
-  save_png(planning_sheet(mesh, dots, plan).picture(), files.back());
+  save_png(planning_sheet(mesh, dots, plan), files.back());
   if (!plan.program.exposures.empty()) {
     files.push_back(folder / "time.svg");
     write_svg(svg_of(time_plot(cell, plan.program)), files.back());

@@ -82,6 +82,11 @@ Json components_json(const std::vector<ComponentReport>& components, const std::
                {"area_mm2", figure(component.area_m2 * 1e6)},
                {"order", component.is_mapped ? "square map" : "3D Hilbert"}};
     if (!component.order_reason.empty()) entry["reason"] = component.order_reason;
+    if (component.is_mapped) {
+      entry["pieces"] = component.piece_count;
+      entry["cut_length_mm"] = figure(component.cut_length_m * 1e3);
+      entry["map_shear"] = figure(component.map_shear);
+    }
     if (i < paths.size()) {
       entry["path_length_mm"] = figure(paths[i].path_length_m * 1e3);
       entry["path_constant"] = figure(paths[i].path_constant);

@@ -182,6 +182,19 @@ std::string picture_at(const PointPicture& picture, double left, double top, dou
   return svg + "\"/>\n";
 }
 
+/// The legend stands at the top, on the side where less of the plot is: left where most points of the upper half lie to
+/// the right.
+bool is_upper_half_full_on_the_right(const Plot& plot, const Axis& x, const Axis& y) {
+  std::ptrdiff_t balance = 0;
+  for (const PlotSeries& series : plot.series)
+    for (const Vector2d& point : series.points) {
+      if (!point.allFinite() || !x.shows(point.x()) || !y.shows(point.y())) continue;
+      if (y.at(point.y()) > (kTop + kHeight - kBottom) / 2) continue;
+      balance += x.at(point.x()) > (kLeft + kWidth - kRight) / 2 ? 1 : -1;
+    }
+  return balance > 0;
+}
+
 }  // namespace
 
 std::string svg_of(const Plot& plot) {
@@ -198,11 +211,14 @@ std::string svg_of(const Plot& plot) {
                                                        : bars_of(series, x, y, color);
   }
   svg += "</g>\n";
+  const bool is_legend_left = is_upper_half_full_on_the_right(plot, x, y);
+  const double legend_x = is_legend_left ? kLeft + 8 : kWidth - kRight - 8;
+  const std::string anchor = is_legend_left ? "start" : "end";
   double below = kTop + 16;
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     if (plot.series[i].name.empty()) continue;
-    svg += text_at(kWidth - kRight - 8, below, plot.series[i].name,
-                   "text-anchor=\"end\" fill=\"" + std::string(kColors[i % kColors.size()]) + "\"");
+    svg += text_at(legend_x, below, plot.series[i].name,
+                   "text-anchor=\"" + anchor + "\" fill=\"" + std::string(kColors[i % kColors.size()]) + "\"");
     below += 16;
   }
   return svg + "</svg>\n";

@@ -58,6 +58,10 @@ TEST(EggCup, IsPaintedWhole) {
   EXPECT_EQ(report.at("mesh").at("genus"), 0);
   EXPECT_EQ(report.at("mesh").at("components"), 1);
   EXPECT_EQ(report.at("mesh").at("boundary_loops"), 0);
+  const Json& component = report.at("components").at(0);
+  EXPECT_EQ(component.at("pieces"), 1);
+  EXPECT_GT(component.at("cut_length_mm"), 60) << "a closed surface is cut from top to bottom";
+  EXPECT_GE(component.at("map_shear"), 1);
   EXPECT_GE(report.at("dots").at("exposed").get<double>(), .99 * report.at("dots").at("placed").get<double>());
 }
 
