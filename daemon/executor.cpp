@@ -93,6 +93,7 @@ class Run {
   void wait_in_position(double deadline_s);
   void expose(std::size_t i);
   void prepare_next(std::size_t i);
+  void check_pulse_conditions(const Laser::Status& laser);
   void wait_pulse_end(double fired_s, const Exposure& exposure);
   void count_own_time() { own_s_ += cell_.clock.now_s() - idle_since_s_; }
 
@@ -106,8 +107,8 @@ class Run {
   Joints at_{};                                   ///< where the last finished move ended
   std::optional<Robot::Positions> robot_target_;  ///< what each chain was last told in this run
   std::optional<Table::Positions> table_target_;
-  double rung_down_s_ = 0;       ///< when what was passed without settling will be at rest, on the cell's clock
-  bool is_dark_proved_ = false;  ///< since the last pulse
+  double rung_down_s_ = 0;         ///< when what was passed without settling will be at rest, on the cell's clock
+  bool is_dark_proved_ = false;    ///< since the last pulse
   std::vector<Joints> way_;        ///< to the exposure under way
   std::size_t next_exposure_ = 0;  ///< that exposure
   std::size_t next_via_ = 0;
@@ -286,7 +287,19 @@ std::span<const Via> Run::vias_of(std::size_t i) {
   return std::span(program_.vias).subspan(first, next_via_ - first);
 }
 
-/// The pulse's length is the device's business; here is only waited for its end.
+/// The light goes out at once, whoever gates it, when what it needs is gone: a robot in alarm may have forgotten the
+/// end of the pulse that it was told.
+void Run::check_pulse_conditions(const Laser::Status& laser) {
+  const auto robot = cell_.robot.status();
+  const auto table = cell_.table.status();
+  check_under_way("robot", robot);
+  check_under_way("table", table);
+  if (!laser.interlock_closed) throw DriverError("the interlock was opened during a pulse");
+  if (!robot.in_position) throw DriverError("the robot left its position during a pulse");
+  if (!table.in_position) throw DriverError("the table left its position during a pulse");
+}
+
+/// The pulse's length is the device's business; here is only waited for its end, woken by whatever changes.
 void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
   const double end_s = cell_.clock.now_s() + exposure.pulse_s;
   const double deadline_s = end_s + kPulseGraceS;
@@ -298,6 +311,7 @@ void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
       idle_since_s_ = is_seen_over ? std::min(laser.dark_since_s, now_s) : now_s;
       return;
     }
+    check_pulse_conditions(laser);
     if (now_s >= deadline_s) throw DriverError("the laser still emits long after its pulse should have ended");
     cell_.clock.sleep_until(now_s < end_s ? end_s : now_s + description_.timing.tick_s);
   }

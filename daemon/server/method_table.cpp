@@ -258,12 +258,13 @@ void MethodTable::add_session_method() {
                       object_schema({{"token", token}}, {"token"}),
                       result_with("user", typed("string", "whose token it is")),
                       [this](const Json& given, const Caller& caller, const Reply& reply) {
-                        if (!caller.identify || !caller.identify(given.at("token").get<std::string>())) {
+                        const auto peer = caller.identify(given.at("token").get<std::string>());
+                        if (!peer) {
                           audit_.record(caller.peer, kSessionOpen, Json::object(), "refused");
                           throw RpcFault{kRpcNotPermitted, "this token is nobody's", "$.token"};
                         }
-                        audit_.record(caller.peer, kSessionOpen, Json::object(), "ok");
-                        reply.result({{"user", caller.peer.user}});
+                        audit_.record(*peer, kSessionOpen, Json::object(), "ok");
+                        reply.result({{"user", peer->user}});
                       }});
 }
 

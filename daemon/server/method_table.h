@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,8 @@ namespace hilbrush {
 /// The connection a request came over.
 struct Caller {
   Peer peer;
-  /// Becomes whoever the token belongs to; false if it is nobody's, and the connection is closed after the answer.
-  std::function<bool(const std::string& token)> identify;
+  /// The connection becomes whoever the token belongs to; if that is nobody, it is closed after the answer.
+  std::function<std::optional<Peer>(const std::string& token)> identify;
   std::function<void(std::int64_t job)> watch, unwatch;
 };
 

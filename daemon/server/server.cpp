@@ -18,6 +18,7 @@
 #include <cstring>
 #include <deque>
 #include <map>
+#include <optional>
 #include <set>
 #include <unordered_set>
 #include <utility>
@@ -76,7 +77,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void serve(std::string_view line);
   void answer(const RpcElement& element, std::function<void(std::string)> send);
   Caller caller();
-  bool identify(const std::string& token);
+  std::optional<Peer> identify(const std::string& token);
   bool may_serve() const { return unread_bytes() < limits_.unread_bytes && pending_replies_ < limits_.pending_replies; }
   std::size_t unread_bytes() const { return outbox_.size() + writing_.size(); }
   void send(const std::string& line);
@@ -96,7 +97,8 @@ class Session : public std::enable_shared_from_this<Session> {
   std::string outbox_, writing_;  ///< not yet handed to the system, being handed
   std::size_t pending_replies_ = 0;
   std::set<std::int64_t> watched_, news_;  ///< jobs; those of them that changed since they were last told
-  bool is_reading_ = false, is_writing_ = false, is_at_end_ = false, is_closed_ = false, is_serving_ = false;
+  bool is_reading_ = false, is_writing_ = false, is_at_end_ = false, is_closed_ = false, is_serving_ = false,
+       is_refused_ = false;
 };
 
 void Session::begin() {
@@ -110,17 +112,16 @@ void Session::begin() {
   read();
 }
 
-bool Session::identify(const std::string& token) {
+std::optional<Peer> Session::identify(const std::string& token) {
   const std::string address = peer_.address;
-  if (auto peer = services_.access.token_peer(token, address)) {
-    peer_ = std::move(*peer);
+  auto peer = services_.access.token_peer(token, address);
+  if (peer) {
+    peer_ = *peer;
     patience_.cancel();
-    return true;
+  } else {
+    is_refused_ = true;  // what it sends after a wrong token is not read
   }
-  is_at_end_ = true;  // what it sends after a wrong token is not read
-  inbox_.clear();
-  searched_ = 0;
-  return false;
+  return peer;
 }
 
 void Session::read() {
@@ -148,7 +149,7 @@ void Session::serve_lines() {
   if (is_serving_ || is_closed_) return;
   is_serving_ = true;
   std::size_t begin = 0;
-  while (!is_closed_ && may_serve()) {
+  while (!is_closed_ && !is_refused_ && may_serve()) {
     const auto end = inbox_.find('\n', std::max(begin, searched_));
     if (end == std::string::npos) {
       searched_ = inbox_.size();
@@ -162,6 +163,11 @@ void Session::serve_lines() {
   inbox_.erase(0, begin);
   searched_ -= std::min(searched_, begin);
   is_serving_ = false;
+  if (is_refused_) {
+    inbox_.clear();
+    searched_ = 0;
+    is_at_end_ = true;
+  }
   if (inbox_.size() > limits_.line_bytes && inbox_.find('\n') > limits_.line_bytes) {
     inbox_.clear();
     searched_ = 0;
@@ -199,7 +205,7 @@ Caller Session::caller() {
   return {peer_,
           [weak](const std::string& token) {
             const auto self = weak.lock();
-            return self && self->identify(token);
+            return self ? self->identify(token) : std::nullopt;
           },
           [weak](std::int64_t job) {
             if (const auto self = weak.lock()) self->watched_.insert(job);

@@ -214,6 +214,7 @@ fs::path DaemonWorld::model(const std::string& name, std::size_t exposures) {
   ExposureProgram program = small_program(exposures);
   program.provenance = {sha256_hex(name.starts_with("stray") ? "another" : text), settings_hash(),
                         load_cell(options.cell).sha256, HILBRUSH_VERSION};
+  if (name.starts_with("older")) program.provenance.version = "0.0.1";
   if (name.starts_with("long"))
     for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
   if (name.starts_with("wild")) program.exposures[exposures / 2].joints[kJ1] = 100;

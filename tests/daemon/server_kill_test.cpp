@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -49,6 +50,7 @@ class DaemonProcess {
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;
 
+  pid_t pid() const { return pid_; }
   /// The exit code, or minus the signal's number.
   int end(int signal) {
     if (pid_ <= 0) return 0;
@@ -79,9 +81,28 @@ std::string key_of(const Joints& joints) {
   return key;
 }
 
+bool is_built() {
+  return ::access((std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd").c_str(), X_OK) == 0;
+}
+
+/// By the witness: no dot twice, and each that is not in doubt once.
+void expect_painted_once(const std::filesystem::path& folder, const Json& job) {
+  const auto in_doubt = job.at("in_doubt").get<std::set<std::size_t>>();
+  std::map<std::string, int> counts;
+  for (const auto& emission : read_emission_record(folder / "emissions.ply")) {
+    EXPECT_FALSE(emission.is_moving);
+    ++counts[key_of(emission.joints)];
+  }
+  const auto program = read_program(folder / "program.ply");
+  for (std::size_t i = 0; i < program.exposures.size(); ++i) {
+    const int count = counts[key_of(program.exposures[i].joints)];
+    EXPECT_LE(count, 1) << "dot " << i;
+    EXPECT_TRUE(count == 1 || in_doubt.contains(i)) << "dot " << i << " was exposed " << count << " times";
+  }
+}
+
 TEST(ServerKillTest, AKilledDaemonLeavesAtMostOneDotInDoubtAndTheRestIsPaintedOnce) {
-  if (::access((std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd").c_str(), X_OK) != 0)
-    GTEST_SKIP() << "hilbrushd is not built";
+  if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
   DaemonWorld world;
   world.options.time_scale = 0.02;
   const unsigned seed = 5;
@@ -106,22 +127,88 @@ TEST(ServerKillTest, AKilledDaemonLeavesAtMostOneDotInDoubtAndTheRestIsPaintedOn
       const Json done = world.wait_for(*client, id, "done");
       EXPECT_LE(done.at("dots").at("in_doubt").get<int>(), kKills);
       EXPECT_EQ(done.at("dots").at("in_doubt").get<int>() + done.at("dots").at("exposed").get<int>(), 800);
-      const auto in_doubt = done.at("in_doubt").get<std::set<std::size_t>>();
-      const auto folder = world.job_folder(id);
-      std::map<std::string, int> counts;
-      for (const auto& emission : read_emission_record(folder / "emissions.ply")) ++counts[key_of(emission.joints)];
-      const auto program = read_program(folder / "program.ply");
-      for (std::size_t i = 0; i < program.exposures.size(); ++i) {
-        const int count = counts[key_of(program.exposures[i].joints)];
-        EXPECT_LE(count, 1) << "dot " << i;
-        EXPECT_TRUE(count == 1 || in_doubt.contains(i)) << "dot " << i << " was exposed " << count << " times";
-      }
+      expect_painted_once(world.job_folder(id), done);
       break;
     }
     while (client->result("job.get", {{"id", id}}).at("job").at("stage") != "paint") std::this_thread::yield();
     std::this_thread::sleep_for(std::chrono::milliseconds(20 + random() % 100));
     EXPECT_EQ(daemon.end(SIGKILL), -SIGKILL);
   }
+}
+
+/// SIGSTOP holds every thread; the clock and the cell go on. What it meets afterwards is as after any silence.
+TEST(ServerKillTest, AFrozenDaemonExposesNothingTwiceWhenItGoesOn) {
+  if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
+  DaemonWorld world;
+  world.options.time_scale = 0.02;
+  const unsigned seed = 8;
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  DaemonProcess daemon(world.options);
+  const auto client = connect(world.options);
+  const auto id = world.submit(*client, world.model("cup.wrl", 800), "ready");
+  world.clear_and_arm(*client);
+  client->result("job.start", {{"id", id}, {"part_in_place", true}});
+  for (int round = 0; round < 12; ++round) {
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 60000));
+    ::kill(daemon.pid(), SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));  // up to 15 s of the cell
+    ::kill(daemon.pid(), SIGCONT);
+    const Json job = client->result("job.get", {{"id", id}}).at("job");
+    if (job.at("state") == "done") break;
+    if (job.at("state") != "paused") continue;
+    world.clear_and_arm(*client);
+    client->result("job.resume", {{"id", id}, {"part_in_place", true}});
+  }
+  for (;;) {
+    const Json job = client->result("job.get", {{"id", id}}).at("job");
+    if (job.at("state") == "done") {
+      expect_painted_once(world.job_folder(id), job);
+      break;
+    }
+    if (job.at("state") == "paused") {
+      world.clear_and_arm(*client);
+      client->result("job.resume", {{"id", id}, {"part_in_place", true}});
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
+}
+
+/// As a disk that fills up: no file may grow any more. The daemon lives, answers, stops the job, and goes on when there
+/// is room again.
+TEST(ServerKillTest, AFullDiskStopsTheJobAndNothingElse) {
+  if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
+  DaemonWorld world;
+  world.options.time_scale = 0.02;
+  DaemonProcess daemon(world.options);
+  const auto client = connect(world.options);
+  const auto id = world.submit(*client, world.model("cup.wrl", 600), "ready");
+  world.clear_and_arm(*client);
+  client->result("job.start", {{"id", id}, {"part_in_place", true}});
+  while (client->result("job.get", {{"id", id}}).at("job").at("dots").at("exposed").get<int>() < 100)
+    std::this_thread::yield();
+  rlimit before{};
+  ASSERT_EQ(::prlimit(daemon.pid(), RLIMIT_FSIZE, nullptr, &before), 0);
+  rlimit full = before;
+  full.rlim_cur = 1;
+  ASSERT_EQ(::prlimit(daemon.pid(), RLIMIT_FSIZE, &full, nullptr), 0);
+  const Json paused = world.wait_for(*client, id, "paused");
+  EXPECT_FALSE(paused.at("error").is_null());
+  EXPECT_EQ(client->result("cell.status").at("cell").at("laser"), "off");
+  EXPECT_FALSE(client->result("system.info").at("system").at("store_fault").is_null());
+  EXPECT_NE(
+      client->error_code("job.submit", {{"model", world.model("b.wrl").string()}, {"settings", {{"size_mm", 80}}}}), 0);
+  EXPECT_EQ(client->result("cell.stop").at("cell").at("state"), "stopped") << "whatever else fails";
+  ASSERT_EQ(::prlimit(daemon.pid(), RLIMIT_FSIZE, &before, nullptr), 0);
+  world.clear_and_arm(*client);
+  client->result("job.resume", {{"id", id}, {"part_in_place", true}});
+  const Json done = world.wait_for(*client, id, "done");
+  EXPECT_LE(done.at("dots").at("in_doubt").get<int>(), 1);
+  EXPECT_EQ(done.at("dots").at("in_doubt").get<int>() + done.at("dots").at("exposed").get<int>(), 600);
+  expect_painted_once(world.job_folder(id), done);
+  EXPECT_EQ(client->result("system.info").at("system").at("store_fault"), nullptr);
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
 }
 
 }  // namespace

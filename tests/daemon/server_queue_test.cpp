@@ -1,0 +1,388 @@
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "config/rpc_errors.h"
+#include "daemon/server/job_store.h"
+#include "sim/devices/emission_record.h"
+#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/sim_devices.h"
+
+/// Order, copies and what survives when files do not.
+namespace hilbrush {
+namespace {
+
+namespace fs = std::filesystem;
+using test::DaemonWorld;
+using test::Json;
+using test::LineClient;
+
+Json placed(const std::string& id) {
+  return {{"id", id}, {"part_in_place", true}};
+}
+
+Json job_of(LineClient& client, const std::string& id) {
+  return client.result("job.get", {{"id", id}}).at("job");
+}
+
+std::string queued(LineClient& client, const fs::path& model) {
+  const Json answer = client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}});
+  return answer.at("job").at("id").get<std::string>();
+}
+
+std::vector<std::string> queue_of(LineClient& client) {
+  std::vector<std::string> ids;
+  const Json listed = client.result("job.list", {{"order", "queue"}});
+  for (const Json& job : listed.at("jobs")) {
+    ids.push_back(job.at("id").get<std::string>());
+    EXPECT_EQ(job.at("position").get<std::size_t>(), ids.size());
+  }
+  return ids;
+}
+
+void execute_sql(const fs::path& file, const std::string& sql) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  char* message = nullptr;
+  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK)
+      << (message != nullptr ? message : "");
+  sqlite3_close(database);
+}
+
+TEST(ServerQueueTest, TheOrderCanBeChangedAndSurvivesARestart) {
+  DaemonWorld world;
+  world.begin();
+  std::string blocking, a, b, c;
+  {
+    LineClient client(world.options.socket);
+    blocking = world.submit(client, world.model("hang.wrl"), "planning");
+    a = queued(client, world.model("a.wrl"));
+    b = queued(client, world.model("b.wrl"));
+    c = queued(client, world.model("c.wrl"));
+    EXPECT_EQ(queue_of(client), (std::vector{blocking, a, b, c}));
+    EXPECT_EQ(client.result("job.move", {{"id", c}, {"position", 2}}).at("job").at("position"), 2);
+    EXPECT_EQ(queue_of(client), (std::vector{blocking, c, a, b}));
+    client.result("job.move", {{"id", a}, {"position", 99}});
+    EXPECT_EQ(queue_of(client), (std::vector{blocking, c, b, a}));
+    EXPECT_EQ(client.error_code("job.move", {{"id", a}, {"position", 0}}), kRpcBadParams);
+    EXPECT_EQ(client.error_code("job.move", {{"id", "77"}, {"position", 1}}), kRpcNoSuchJob);
+  }
+  world.end();
+  world.begin();
+  LineClient client(world.options.socket);
+  EXPECT_EQ(queue_of(client), (std::vector{blocking, c, b, a}));
+  client.result("job.cancel", {{"id", blocking}});
+  EXPECT_EQ(client.error_code("job.move", {{"id", blocking}, {"position", 1}}), kRpcWrongState)
+      << "a cancelled job has no place";
+  // Planned in that order: b is not touched before c is ready.
+  for (std::string state; state != "ready"; state = job_of(client, c).at("state").get<std::string>())
+    EXPECT_TRUE(state.empty() || job_of(client, a).at("state") == "queued" || job_of(client, c).at("state") == "ready");
+  for (const auto& id : {b, a}) world.wait_for(client, id, "ready");
+  EXPECT_EQ(queue_of(client), (std::vector{c, b, a}));
+}
+
+TEST(ServerQueueTest, CopiesArePaintedOneAfterAnotherEachOnItsOwnPart) {
+  DaemonWorld world;
+  world.begin();
+  auto connected = std::make_unique<LineClient>(world.options.socket);
+  const Json order{{"model", world.model("cup.wrl", 120).string()},
+                   {"settings", {{"size_mm", 80}}},
+                   {"copies", 3},
+                   {"key", "three cups"}};
+  const auto id = connected->result("job.submit", order).at("job").at("id").get<std::string>();
+  world.wait_for(*connected, id, "ready");
+  for (int copy = 1; copy <= 3; ++copy) {
+    EXPECT_EQ(connected->error_code("job.start", {{"id", id}}), kRpcBadParams) << "each part is confirmed";
+    if (copy == 1)
+      world.clear_and_arm(*connected);
+    else
+      connected->result("cell.arm");
+    connected->result("job.start", placed(id));
+    const Json job = world.wait_for(*connected, id, copy == 3 ? "done" : "ready");
+    EXPECT_EQ(job.at("copies_done"), copy);
+    EXPECT_EQ(job.at("dots").at("exposed"), copy == 3 ? 120 : 0) << "the counts are those of the present part";
+    EXPECT_EQ(connected->result("cell.status").at("cell").at("state"), "idle") << "armed for each part anew";
+    if (copy == 2) {
+      world.end();
+      world.begin();
+      connected = std::make_unique<LineClient>(world.options.socket);
+      EXPECT_EQ(job_of(*connected, id).at("copies_done"), 2);
+      connected->result("cell.clear");
+    }
+  }
+  for (const char* name : {"emissions.ply", "emissions-2.ply", "emissions-3.ply"})
+    EXPECT_EQ(read_emission_record(world.job_folder(id) / name).size(), 120u) << name;
+  EXPECT_EQ(connected->result("job.submit", order).at("job").at("id"), id);
+  Json other = order;
+  other["copies"] = 4;
+  EXPECT_EQ(connected->error_code("job.submit", other), kRpcBadParams) << "the same key, another order";
+  other["copies"] = 0;
+  EXPECT_EQ(connected->error_code("job.submit", other), kRpcBadParams);
+  other = {{"model", order.at("model")}, {"settings", order.at("settings")}, {"copies", 2}, {"dry_run", true}};
+  EXPECT_EQ(connected->error_code("job.submit", other), kRpcBadParams);
+}
+
+TEST(ServerQueueTest, AMissingJournalIsNeverMadeAnew) {
+  DaemonWorld world;
+  world.options.time_scale = .02;
+  world.begin();
+  LineClient client(world.options.socket);
+  const auto id = world.submit(client, world.model("cup.wrl", 500), "ready");
+  world.clear_and_arm(client);
+  client.result("job.start", placed(id));
+  while (job_of(client, id).at("dots").at("exposed").get<int>() < 20) std::this_thread::yield();
+  client.result("job.pause", {{"id", id}});
+  world.wait_for(client, id, "paused");
+  const auto before = read_emission_record(world.job_folder(id) / "emissions.ply").size();
+  fs::remove(world.job_folder(id) / "journal");
+  client.result("job.resume", {{"id", id}});
+  const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
+  Json job;
+  do job = job_of(client, id);
+  while (job.at("error").is_null() && std::chrono::steady_clock::now() < deadline);
+  EXPECT_EQ(job.at("state"), "paused");
+  EXPECT_NE(job.at("error").at("message").get<std::string>().find("the journal is missing"), std::string::npos);
+  EXPECT_EQ(read_emission_record(world.job_folder(id) / "emissions.ply").size(), before);
+}
+
+TEST(ServerQueueTest, AProgramOfAnotherVersionRefusesToRun) {
+  DaemonWorld world;
+  world.begin();
+  LineClient client(world.options.socket);
+  const auto id = world.submit(client, world.model("older.wrl"), "ready");
+  world.clear_and_arm(client);
+  client.result("job.start", placed(id));
+  const Json job = world.wait_for(client, id, "failed");
+  EXPECT_NE(job.at("error").at("message").get<std::string>().find("version 0.0.1"), std::string::npos) << job;
+}
+
+TEST(ServerQueueTest, ALostStoreIsMadeAgainFromTheJobsFolders) {
+  for (const bool is_damaged : {true, false}) {
+    SCOPED_TRACE(is_damaged ? "damaged" : "missing");
+    DaemonWorld world;
+    world.options.time_scale = .02;
+    world.begin();
+    std::string done, painting, nameless;
+    {
+      LineClient client(world.options.socket);
+      done = world.submit(client, world.model("dry.wrl"), "done", true);
+      nameless = world.submit(client, world.model("other.wrl"), "ready");
+      painting = world.submit(client, world.model("cup.wrl", 600), "ready");
+      client.result("job.move", {{"id", painting}, {"position", 1}});
+      world.clear_and_arm(client);
+      client.result("job.start", placed(painting));
+      while (job_of(client, painting).at("dots").at("exposed").get<int>() < 50) std::this_thread::yield();
+    }
+    world.end();
+    if (is_damaged)
+      std::ofstream(world.options.state / "jobs.sqlite") << std::string(10000, 'x');
+    else
+      fs::remove(world.options.state / "jobs.sqlite");
+    for (const char* suffix : {"-wal", "-shm"}) fs::remove(world.options.state / ("jobs.sqlite" + std::string(suffix)));
+    fs::remove(world.job_folder(nameless) / "job.json");
+    world.begin();
+    EXPECT_NE(world.daemon().notice().find("2 jobs were found again"), std::string::npos) << world.daemon().notice();
+    LineClient client(world.options.socket);
+    EXPECT_EQ(job_of(client, done).at("state"), "done");
+    EXPECT_EQ(job_of(client, nameless).at("state"), "failed") << "its files keep its number";
+    const Json job = job_of(client, painting);
+    EXPECT_EQ(job.at("state"), "paused");
+    EXPECT_EQ(queue_of(client), std::vector{painting});
+    world.clear_and_arm(client);
+    client.result("job.resume", placed(painting));
+    const Json end = world.wait_for(client, painting, "done");
+    EXPECT_EQ(end.at("dots").at("exposed").get<int>() + end.at("dots").at("in_doubt").get<int>(), 600);
+    const auto fresh = world.submit(client, world.model("new.wrl"), "ready");
+    EXPECT_GT(std::stoi(fresh), std::stoi(painting)) << "no job gets another's folder";
+  }
+}
+
+/// As the first version wrote it.
+constexpr const char* kFirstSchema = R"(
+  CREATE TABLE job (
+    id INTEGER PRIMARY KEY AUTOINCREMENT, key TEXT UNIQUE, uid INTEGER NOT NULL, gid INTEGER NOT NULL,
+    state TEXT NOT NULL, model TEXT NOT NULL, model_copy TEXT NOT NULL, model_sha256 TEXT NOT NULL,
+    settings TEXT NOT NULL, settings_sha256 TEXT NOT NULL, cell TEXT NOT NULL, dry_run INTEGER NOT NULL,
+    created TEXT NOT NULL, placed INTEGER NOT NULL, skipped INTEGER NOT NULL, exposed INTEGER NOT NULL,
+    planned_s REAL NOT NULL, error_at TEXT, error_message TEXT, warnings TEXT NOT NULL);
+  PRAGMA user_version = 1;
+  INSERT INTO job VALUES (3, 'k', 1000, 1000, 'paused', '/m.wrl', '/c/m.wrl', 'ab', '{}', 'cd', '/cell.json', 0,
+    '2026-01-01T00:00:00Z', 10, 2, 5, 1.5, NULL, NULL, '["w"]');
+  INSERT INTO job VALUES (5, NULL, 1000, 1000, 'ready', '/n.wrl', '', '', '{}', '', '/cell.json', 0,
+    '2026-01-02T00:00:00Z', 10, 2, 0, 1.5, 'n.wrl:3', 'a sentence', '[]');
+  INSERT INTO job VALUES (6, NULL, 1000, 1000, 'done', '/o.wrl', '', '', '{}', '', '/cell.json', 1,
+    '2026-01-02T00:00:00Z', 10, 2, 0, 1.5, NULL, NULL, '[]');
+)";
+
+TEST(JobStoreTest, AnOldSchemaIsMigratedAndNothingIsLost) {
+  const test::TemporaryFolder folder;
+  execute_sql(folder / "jobs.sqlite", kFirstSchema);
+  std::string set_aside;
+  {
+    JobStore store(folder / "jobs.sqlite", &set_aside);
+    EXPECT_EQ(set_aside, "");
+    EXPECT_FALSE(store.is_new());
+    const auto jobs = store.load_recent(10);
+    ASSERT_EQ(jobs.size(), 3u);
+    EXPECT_EQ(jobs[0].key, "k");
+    EXPECT_EQ(jobs[0].state, JobState::kPaused);
+    EXPECT_TRUE(jobs[0].is_begun) << "a paused job has a journal";
+    EXPECT_EQ(jobs[0].rank, 3);
+    EXPECT_EQ(jobs[0].copies, 1);
+    EXPECT_EQ(jobs[0].warnings, std::vector<std::string>{"w"});
+    EXPECT_FALSE(jobs[1].is_begun);
+    ASSERT_TRUE(jobs[1].error);
+    EXPECT_EQ(jobs[1].error->at, "n.wrl:3");
+    EXPECT_EQ(jobs[2].copies_done, 0) << "a dry run paints no part";
+    EXPECT_EQ(store.find_key("k")->id, 3);
+    EXPECT_FALSE(store.find_key("l"));
+    EXPECT_FALSE(store.find(4));
+    Job job = jobs[0];
+    job.key.clear();
+    store.insert(job);
+    EXPECT_EQ(job.id, 7);
+  }
+  JobStore again(folder / "jobs.sqlite", &set_aside);
+  EXPECT_EQ(again.load_recent(10).size(), 4u);
+  EXPECT_EQ(set_aside, "");
+}
+
+TEST(JobStoreTest, AStoreOfANewerDaemonIsSetAsideWithASentence) {
+  const test::TemporaryFolder folder;
+  execute_sql(folder / "jobs.sqlite", "CREATE TABLE job (id INTEGER); PRAGMA user_version = 99;");
+  std::string set_aside;
+  JobStore store(folder / "jobs.sqlite", &set_aside);
+  EXPECT_NE(set_aside.find("newer"), std::string::npos);
+  EXPECT_TRUE(store.is_new());
+}
+
+TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
+  const test::TemporaryFolder folder;
+  JobStore store(folder / "jobs.sqlite", nullptr);
+  for (int i = 0; i < 20; ++i) {
+    Job job;
+    job.state = i == 4 ? JobState::kReady : JobState::kDone;
+    job.own_time = {7, .001, .002};
+    store.insert(job);
+  }
+  const auto recent = store.load_recent(5);
+  ASSERT_EQ(recent.size(), 6u);
+  EXPECT_EQ(recent.front().id, 5);
+  EXPECT_EQ(recent.back().id, 20);
+  ASSERT_TRUE(store.find(1)) << "the rest is still there";
+  EXPECT_EQ(store.find(1)->own_time.p99_s, .002);
+}
+
+TEST(JobRecordTest, SaysAllOfAJobAndReadsWhateverItIsGiven) {
+  Job job;
+  job.id = 12;
+  job.key = "k\"\xff";
+  job.state = JobState::kPaused;
+  job.model = "/a b.wrl";
+  job.copies = 3;
+  job.copies_done = 1;
+  job.is_begun = true;
+  job.error = JobError{"x:1", "no"};
+  job.warnings = {"one", "two"};
+  const auto back = job_from_record(job_to_record(job));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->id, 12);
+  EXPECT_EQ(back->state, JobState::kPaused);
+  EXPECT_EQ(back->copies_done, 1);
+  EXPECT_TRUE(back->is_begun);
+  EXPECT_EQ(back->error->message, "no");
+  EXPECT_EQ(back->warnings, job.warnings);
+  for (const char* text : {"", "[]", "{", "{}", R"({"id":-1,"state":"done"})", R"({"id":1,"state":"asleep"})"})
+    EXPECT_FALSE(job_from_record(text)) << text;
+  const auto odd = job_from_record(R"({"id":1,"state":"done","copies":"many","warnings":7,"error_message":[]})");
+  ASSERT_TRUE(odd);
+  EXPECT_EQ(odd->copies, 1);
+}
+
+/// The daemon on devices of the test's own.
+class ServerDevicesTest : public ::testing::Test {
+ protected:
+  void begin(double time_scale = 0) {
+    world.options.time_scale = time_scale;
+    world.options.make_devices = [this](const CellDescription& description) {
+      auto made = std::make_unique<test::SimDevices>(description);
+      devices = made.get();
+      return made;
+    };
+    world.begin();
+    client.emplace(world.options.socket);
+  }
+  Json wait_for_state(const std::string& state) {
+    const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
+    for (;;) {
+      const Json cell = client->result("cell.status").at("cell");
+      if (cell.at("state") == state) return cell;
+      if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error("the cell is " + cell.dump());
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+  test::SimDevices* devices = nullptr;
+  DaemonWorld world;
+  std::optional<LineClient> client;
+};
+
+TEST_F(ServerDevicesTest, AnInterlockOpenedWhileArmedIsAStopThatLatches) {
+  begin();
+  client->result("cell.clear");
+  devices->sim.set_interlock_closed(false);
+  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  EXPECT_EQ(client->result("cell.status").at("cell").at("state"), "idle") << "a part may be changed at rest";
+  devices->sim.set_interlock_closed(true);
+  client->result("cell.arm");
+  devices->sim.set_interlock_closed(false);
+  const Json cell = wait_for_state("stopped");
+  EXPECT_NE(cell.at("reason").get<std::string>().find("interlock"), std::string::npos);
+  devices->sim.set_interlock_closed(true);
+  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  EXPECT_EQ(client->result("cell.status").at("cell").at("state"), "stopped");
+  EXPECT_EQ(client->error_code("cell.arm"), kRpcWrongState);
+  world.clear_and_arm(*client);
+}
+
+TEST_F(ServerDevicesTest, ADeviceThatFailsAtRestStopsTheCellAndIsBroughtBackByClear) {
+  begin();
+  client->result("cell.clear");
+  devices->sim.fail_robot("the link was lost");
+  const Json cell = wait_for_state("stopped");
+  EXPECT_NE(cell.at("reason").get<std::string>().find("the link was lost"), std::string::npos);
+  world.clear_and_arm(*client);
+  EXPECT_EQ(client->result("cell.status").at("cell").at("devices").at("robot").at("state"), "ready");
+}
+
+TEST_F(ServerDevicesTest, ADeviceThatFailsInAJobPausesItAndTheJobGoesOn) {
+  begin(.02);
+  const auto id = world.submit(*client, world.model("cup.wrl", 600), "ready");
+  world.clear_and_arm(*client);
+  client->result("job.start", placed(id));
+  for (int round = 0; round < 3; ++round) {
+    const int before = job_of(*client, id).at("dots").at("exposed").get<int>();
+    while (job_of(*client, id).at("dots").at("exposed").get<int>() < before + 30) std::this_thread::yield();
+    if (round == 0) devices->sim.fail_table("overload");
+    if (round == 1) devices->sim.set_interlock_closed(false);
+    if (round == 2) devices->sim.fail_robot("collision");
+    const Json job = world.wait_for(*client, id, "paused");
+    EXPECT_FALSE(job.at("error").is_null());
+    EXPECT_TRUE(job.at("needs_part_in_place").get<bool>());
+    EXPECT_LE(job.at("dots").at("in_doubt").get<int>(), round + 1);
+    devices->sim.set_interlock_closed(true);
+    world.clear_and_arm(*client);
+    EXPECT_EQ(client->error_code("job.resume", {{"id", id}}), kRpcWrongState);
+    client->result("job.resume", placed(id));
+  }
+  const Json job = world.wait_for(*client, id, "done");
+  EXPECT_EQ(job.at("dots").at("exposed").get<int>() + job.at("dots").at("in_doubt").get<int>(), 600);
+  ASSERT_TRUE(job.at("timing").is_object());
+  EXPECT_GT(job.at("timing").at("own_ms").at("p99").get<double>(), 0);
+  for (const auto& emission : read_emission_record(world.job_folder(id) / "emissions.ply"))
+    EXPECT_FALSE(emission.is_moving);
+}
+
+}  // namespace
+}  // namespace hilbrush

@@ -1,0 +1,269 @@
+#include <gtest/gtest.h>
+#include <malloc.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <random>
+#include <set>
+
+#include "planner/program_file.h"
+#include "sim/devices/emission_record.h"
+#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/sim_devices.h"
+
+/// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients
+/// that come, talk nonsense and go. HILBRUSH_LONG=1 makes it an hour.
+namespace hilbrush {
+namespace {
+
+namespace fs = std::filesystem;
+using test::DaemonWorld;
+using test::Json;
+using test::LineClient;
+using Steady = std::chrono::steady_clock;
+
+std::size_t descriptors() {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator{}));
+}
+
+double resident_mb() {
+  ::malloc_trim(0);
+  std::ifstream in("/proc/self/statm");
+  double size = 0, resident = 0;
+  in >> size >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+/// Clients that mean no good: half messages, nonsense, watchers that never read, connections dropped at any time.
+class Crowd {
+ public:
+  Crowd(DaemonWorld& world, unsigned seed) : world_(world), random_(seed), thread_([this] { run(); }) {}
+  ~Crowd() { end(); }
+  void end() {
+    is_ending_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  std::size_t visits() const { return visits_; }
+
+ private:
+  void run() {
+    while (!is_ending_) {
+      try {
+        visit();
+      } catch (const std::exception&) {  // thrown out, or nobody answered: both may be
+      }
+      ++visits_;
+    }
+  }
+  void visit() {
+    LineClient client(world_.options.socket);
+    switch (random_() % 6) {
+      case 0:
+        client.send_bytes("{\"jsonrpc\":\"2.0\",\"id\":1,\"meth");
+        break;
+      case 1: {
+        std::string noise(random_() % 5000, ' ');
+        for (char& c : noise) c = static_cast<char>(random_());
+        client.send_bytes(noise + "\n");
+        break;
+      }
+      case 2:
+        client.call("job.watch", {{"id", std::to_string(1 + random_() % 50)}});
+        std::this_thread::sleep_for(std::chrono::milliseconds(random_() % 50));
+        break;
+      case 3:
+        for (int i = 0; i < 50; ++i)
+          client.send_without_waiting("{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"rpc.discover\"}\n");
+        break;
+      case 4:
+        client.call("job.list", {{"limit", 20}});
+        client.call("cell.status");
+        client.call("job.start", {{"id", "1"}, {"part_in_place", true}});
+        break;
+      default:
+        client.call("system.info");
+        client.end_sending();
+        while (client.read_line()) {
+        }
+    }
+  }
+
+  DaemonWorld& world_;
+  std::mt19937 random_;
+  std::atomic<bool> is_ending_{false};
+  std::atomic<std::size_t> visits_{0};
+  std::thread thread_;
+};
+
+class Soak {
+ public:
+  explicit Soak(unsigned seed) : random_(seed) {
+    world_.options.time_scale = 0.01;
+    world_.options.make_devices = [this](const CellDescription& description) {
+      auto made = std::make_unique<test::SimDevices>(description);
+      devices_ = made.get();
+      return made;
+    };
+    models_ = {world_.model("cup.wrl", 150), world_.model("long.wrl", 60), world_.model("bowl.wrl", 300)};
+    world_.begin();
+  }
+
+  void paint_one_job() {
+    LineClient client(world_.options.socket);
+    const int copies = random_() % 4 == 0 ? 2 : 1;
+    const fs::path model = models_[random_() % models_.size()];
+    const auto id =
+        client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}, {"copies", copies}})
+            .at("job")
+            .at("id")
+            .get<std::string>();
+    if (random_() % 4 == 0) client.call("job.submit", {{"model", "/no/such.wrl"}});
+    world_.wait_for(client, id, "ready");
+    for (int copy = 1; copy <= copies; ++copy) paint_copy(client, id, copy, copy == copies);
+    ++jobs;
+  }
+
+  DaemonWorld& world() { return world_; }
+  std::size_t jobs = 0, disturbances = 0, doubts = 0;
+
+ private:
+  /// Armed and painting, from whatever state the cell is in.
+  void set_going(LineClient& client, const std::string& id) {
+    for (int attempt = 0; attempt < 200; ++attempt) {
+      devices_->sim.set_interlock_closed(true);
+      const auto cell = client.result("cell.status").at("cell").at("state").get<std::string>();
+      if (cell == "stopped") client.call("cell.clear");
+      if (cell == "idle") client.call("cell.arm");
+      const auto job = state(client, id);
+      if (job != "ready" && job != "paused") return;
+      client.call(job == "ready" ? "job.start" : "job.resume", {{"id", id}, {"part_in_place", true}});
+    }
+    throw std::runtime_error("job " + id + " can't be got going");
+  }
+  std::string state(LineClient& client, const std::string& id) {
+    return client.result("job.get", {{"id", id}}).at("job").at("state").get<std::string>();
+  }
+
+  void disturb(LineClient& client, const std::string& id) {
+    ++disturbances;
+    switch (random_() % 6) {
+      case 0:
+        client.result("cell.stop");
+        break;
+      case 1:
+        devices_->sim.fail_robot("following error");
+        break;
+      case 2:
+        devices_->sim.fail_table("the link was lost");
+        break;
+      case 3:
+        devices_->sim.set_interlock_closed(false);
+        break;
+      case 4:
+        client.call("job.pause", {{"id", id}});
+        break;
+      default:
+        client.call("cell.home");  // refused while painting
+    }
+  }
+
+  void paint_copy(LineClient& client, const std::string& id, int copy, bool is_last) {
+    set_going(client, id);
+    Json job;
+    for (;;) {
+      job = client.result("job.get", {{"id", id}}).at("job");
+      const auto now = job.at("state").get<std::string>();
+      if (now == "done" || job.at("copies_done").get<int>() >= copy) break;
+      if (now == "failed") throw std::runtime_error(job.dump());
+      if (now == "paused") set_going(client, id);
+      if (random_() % 40 == 0) disturb(client, id);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    check_copy(id, copy, is_last ? job : Json());
+  }
+
+  /// The witness against the counts.
+  void check_copy(const std::string& id, int copy, const Json& job) {
+    const fs::path folder = world_.job_folder(id);
+    const auto program = read_program(folder / "program.ply");
+    std::map<std::array<long long, kAxisCount>, int> counts;
+    const auto key = [](const Joints& joints) {
+      std::array<long long, kAxisCount> rounded{};
+      for (std::size_t i = 0; i < kAxisCount; ++i) rounded[i] = std::llround(joints[i] * 1e10);
+      return rounded;
+    };
+    const auto file = folder / ("emissions" + (copy > 1 ? "-" + std::to_string(copy) : std::string()) + ".ply");
+    for (const auto& emission : read_emission_record(file)) {
+      ASSERT_FALSE(emission.is_moving);
+      ASSERT_EQ(++counts[key(emission.joints)], 1) << "a dot twice";
+    }
+    const std::size_t lit = counts.size();
+    ASSERT_LE(lit, program.exposures.size());
+    if (!job.is_object()) return;
+    const auto exposed = job.at("dots").at("exposed").get<std::size_t>();
+    const auto in_doubt = job.at("dots").at("in_doubt").get<std::size_t>();
+    doubts += in_doubt;
+    ASSERT_EQ(exposed + in_doubt, program.exposures.size());
+    ASSERT_GE(lit, exposed);
+    ASSERT_LE(lit, exposed + in_doubt);
+    for (const auto& i : job.at("in_doubt")) counts.erase(key(program.exposures[i.get<std::size_t>()].joints));
+    ASSERT_EQ(counts.size(), exposed);
+  }
+
+  std::mt19937 random_;
+  test::SimDevices* devices_ = nullptr;
+  DaemonWorld world_;
+  std::vector<fs::path> models_;
+};
+
+TEST(SoakTest, JobsFaultsAndClientsLeaveNoTraceInMemoryOrDescriptorsAndCountsAreTrue) {
+  const bool is_long = std::getenv("HILBRUSH_LONG") != nullptr;
+  const auto length = is_long ? std::chrono::seconds(3600) : std::chrono::seconds(12);
+  const unsigned seed = 31;
+  SCOPED_TRACE(seed);
+  Soak soak(seed);
+  const auto begin = Steady::now();
+  const auto run_until = [&](Steady::time_point end, unsigned crowd_seed) {
+    Crowd a(soak.world(), crowd_seed), b(soak.world(), crowd_seed + 1);
+    while (Steady::now() < end && !::testing::Test::HasFailure()) soak.paint_one_job();
+    a.end();
+    b.end();
+    return a.visits() + b.visits();
+  };
+  std::size_t visits = run_until(begin + length / 4, 100);
+  // Gone clients are noticed when the daemon next looks.
+  const auto settle = [&] {
+    LineClient client(soak.world().options.socket);
+    for (int i = 0; i < 500; ++i) {
+      if (client.result("system.info").at("system").at("clients") == 1) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_EQ(client.result("system.info").at("system").at("clients"), 1);
+  };
+  settle();
+  const auto fds = descriptors();
+  const double mb = resident_mb();
+  const auto jobs = soak.jobs;
+  visits += run_until(begin + length, 200);
+  settle();
+  const auto fds_after = descriptors();
+  const double mb_after = resident_mb();
+  std::cout << soak.jobs << " jobs, " << soak.disturbances << " disturbances, " << soak.doubts << " dots in doubt, "
+            << visits << " visits; resident " << mb << " -> " << mb_after << " MB over " << soak.jobs - jobs
+            << " jobs, descriptors " << fds << " -> " << fds_after << "\n";
+  EXPECT_LE(fds_after, fds + 2);
+  // A thousand jobs of history are kept in memory, some kilobytes each.
+  EXPECT_LE(mb_after, mb + 12);
+  EXPECT_GT(soak.jobs, 10u);
+}
+
+}  // namespace
+}  // namespace hilbrush
