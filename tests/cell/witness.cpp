@@ -71,8 +71,7 @@ Testimony hear_witness(const ExposureProgram& program, std::vector<Emission> emi
     const double commanded_s = place ? static_cast<double>(program.exposures[*place].pulse_s) : emission.commanded_s;
     const double overrun_s = emission.length_s - commanded_s;
     testimony.longest_overrun_s = std::max(testimony.longest_overrun_s, overrun_s);
-    // A millisecond is the pulse's resolution: its power makes up for what rounding takes.
-    if (overrun_s > std::max(options.overrun_s, .5e-3 + 1e-9)) ++testimony.too_long;
+    if (overrun_s > options.overrun_s + 1e-9) ++testimony.too_long;
     if (!place) {
       ++testimony.strays;
       continue;

@@ -1,0 +1,153 @@
+#pragma once
+#include <functional>
+#include <string>
+
+#include "drivers/cell.h"
+#include "sim/wire/wired_devices.h"
+
+/// The devices of the simulated cell, with all their faults, behind the drivers' interfaces without any wire between:
+/// under virtual time, in which thousands of jobs with faults take seconds. What stands for the drivers here is as
+/// careful as they have to be, and no more: it believes a device that says it is in position where it was sent, for as
+/// long as it was told; an exchange that fails leaves the link lost.
+namespace hilbrush::test {
+
+class VirtualClock final : public Clock {
+ public:
+  explicit VirtualClock(WiredDevices& devices) : devices_(devices) {}
+  double now_s() const override { return devices_.cell().now_s(); }
+  void sleep_until(double time_s) override;
+  void wake() override {}
+  /// Called once for each exchange and sleep: for whoever acts at a moment (an operator's stop).
+  std::function<void()> on_time;
+
+ private:
+  WiredDevices& devices_;
+};
+
+/// An exchange with a device: takes time, may fail by the fault script.
+class VirtualLink {
+ public:
+  VirtualLink(WireDevice device, WiredDevices& devices, VirtualClock& clock)
+      : device_(device), devices_(devices), clock_(clock) {}
+  /// `act` is what the device does when it obeys; false: it refuses. @throws DriverError as the fault wants it
+  void exchange(const std::function<bool()>& act);
+  bool is_lost() const { return !lost_.empty(); }
+  const std::string& why() const { return lost_; }
+  void connect() { lost_.clear(); }
+
+ private:
+  static constexpr double kExchangeS = 2e-4, kPatienceS = .1;
+  [[noreturn]] void lose(const std::string& how);
+  const WireDevice device_;
+  WiredDevices& devices_;
+  VirtualClock& clock_;
+  std::string lost_;
+};
+
+class VirtualRobot final : public Robot {
+ public:
+  VirtualRobot(WiredDevices& devices, VirtualClock& clock)
+      : devices_(devices), clock_(clock), link_(WireDevice::kRobot, devices, clock) {}
+  void connect() override;
+  void enable() override;
+  void home() override;
+  void disable() noexcept override;
+  void clear_fault() override;
+  void move_to(const Positions& target, double settle_s) override;
+  Status status() override;
+  double expected_arrival_s() override;
+  void stop() noexcept override;
+
+  // The gate: an output of the robot.
+  void pulse(double pulse_s);
+  bool gate_off() noexcept;
+  bool is_gate_on();
+
+ private:
+  void command(bool is_motion, const std::string& name, const std::vector<std::string>& arguments);
+  void look();
+  void fault_if_lost();
+  WiredDevices& devices_;
+  VirtualClock& clock_;
+  VirtualLink link_;
+  DeviceState state_ = DeviceState::kDisconnected;
+  std::string fault_;
+  int mode_ = 4;
+  Positions seen_{}, target_{};
+  bool has_target_ = false, is_output_on_ = false;
+  double settle_s_ = 0, rest_since_s_ = -1;
+};
+
+class VirtualTable final : public Table {
+ public:
+  VirtualTable(WiredDevices& devices, VirtualClock& clock)
+      : devices_(devices), clock_(clock), link_(WireDevice::kTable, devices, clock) {}
+  void connect() override;
+  void enable() override;
+  void home() override;
+  void disable() noexcept override;
+  void clear_fault() override;
+  void move_to(const Positions& target, double settle_s) override;
+  Status status() override;
+  double expected_arrival_s() override;
+  void stop() noexcept override;
+
+ private:
+  void look();
+  void fault_if_lost();
+  WiredDevices& devices_;
+  VirtualClock& clock_;
+  VirtualLink link_;
+  DeviceState state_ = DeviceState::kDisconnected;
+  std::string fault_;
+  Positions seen_{}, target_{};
+  bool has_target_ = false, is_reported_there_ = false;
+  double settle_s_ = 0, rest_since_s_ = -1;
+};
+
+class VirtualLaser final : public Laser {
+ public:
+  VirtualLaser(WiredDevices& devices, VirtualRobot& robot, VirtualClock& clock)
+      : devices_(devices), robot_(robot), clock_(clock), link_(WireDevice::kLaser, devices, clock) {}
+  void connect() override;
+  Limits limits() override;
+  void enable() override;
+  void disable() noexcept override;
+  void fire(double power_w, double pulse_s) override;
+  bool off() noexcept override;
+  Status status() override;
+  void clear_fault() override;
+
+ private:
+  void fault_if_lost();
+  WiredDevices& devices_;
+  VirtualRobot& robot_;
+  VirtualClock& clock_;
+  VirtualLink link_;
+  DeviceState state_ = DeviceState::kDisconnected;
+  std::string fault_;
+  bool is_closed_ = true;
+  double power_w_ = 0;
+};
+
+class VirtualCell {
+ public:
+  VirtualCell(const CellDescription& description, const WireOptions& options)
+      : devices(description, options),
+        clock(devices),
+        robot(devices, clock),
+        table(devices, clock),
+        laser(devices, robot, clock) {
+    devices.cell().set_sink([this](const Emission& emission) { emissions.push_back(emission); });
+  }
+  Cell cell() { return {robot, table, laser, clock}; }
+
+  std::vector<Emission> emissions;
+  WiredDevices devices;
+  VirtualClock clock;
+  VirtualRobot robot;
+  VirtualTable table;
+  VirtualLaser laser;
+};
+
+}  // namespace hilbrush::test
