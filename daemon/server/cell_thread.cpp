@@ -88,7 +88,8 @@ void CellThread::stop(std::function<void(bool)> done) {
   woken_.notify_all();
 }
 
-/// Stops that were asked for meanwhile are carried out together.
+/// Stops that were asked for meanwhile are carried out together. What the executor was just about to tell a device when
+/// the stop came (a reference run may take a minute) is stopped again, until the executor is at rest.
 void CellThread::carry_out_stops() {
   for (;;) {
     std::vector<std::function<void(bool)>> asked;
@@ -104,6 +105,13 @@ void CellThread::carry_out_stops() {
         --orders_under_way_;
         done(is_off);
       });
+    constexpr auto kAgain = std::chrono::milliseconds(20);
+    std::unique_lock lock(mutex_);
+    while (is_working_ && !woken_.wait_for(lock, kAgain, [this] { return is_ending_ || !stops_.empty(); })) {
+      lock.unlock();
+      if (is_stop_latched()) stop_now();
+      lock.lock();
+    }
   }
 }
 
@@ -125,8 +133,11 @@ void CellThread::run() {
       if (is_ending_) return;
       task = std::move(tasks_.front());
       tasks_.pop_front();
+      is_working_ = true;
     }
     task();
+    const std::lock_guard lock(mutex_);
+    is_working_ = false;
   }
 }
 
@@ -156,40 +167,64 @@ void CellThread::act(std::function<void()> work, Done done) {
       std::move(done));
 }
 
+/// Called between any two steps of an act that a stop may overtake.
+void CellThread::check_stop() const {
+  if (control_.stop.load()) throw DriverError("the cell was stopped");
+}
+
 void CellThread::clear(Done done) {
-  act(
-      [this] {
-        const auto bring_back = [](auto& device) {
-          if (device.status().state == DeviceState::kFault) device.clear_fault();
-          if (device.status().state == DeviceState::kDisconnected) device.connect();
-        };
-        bring_back(cell_.laser);
-        if (!cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
-        bring_back(cell_.robot);
-        bring_back(cell_.table);
-        if (cell_.robot.status().state == DeviceState::kConnected) cell_.robot.enable();
-        if (cell_.table.status().state == DeviceState::kConnected) cell_.table.enable();
-      },
-      std::move(done));
+  act([this] { clear_devices(); }, std::move(done));
+}
+
+void CellThread::clear_devices() {
+  const auto bring_back = [this](auto& device) {
+    check_stop();
+    if (device.status().state == DeviceState::kFault) device.clear_fault();
+    check_stop();
+    if (device.status().state == DeviceState::kDisconnected) device.connect();
+  };
+  bring_back(cell_.laser);
+  if (!cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
+  bring_back(cell_.robot);
+  bring_back(cell_.table);
+  const auto enable = [this](auto& axes) {
+    check_stop();
+    if (axes.status().state == DeviceState::kConnected) axes.enable();
+  };
+  enable(cell_.robot);
+  enable(cell_.table);
 }
 
 void CellThread::arm(Done done) {
   act([this] { arm_devices(); }, std::move(done));
 }
 
+/// Those that have lost their reference.
+void CellThread::find_references() {
+  const auto home = [this](auto& axes) {
+    check_stop();
+    if (axes.status().state == DeviceState::kEnabled) axes.home();
+  };
+  home(cell_.robot);
+  home(cell_.table);
+  check_stop();
+}
+
 /// A stop may come at any instant of this: its flag is looked at after emission has been armed, so that one of the two
 /// always undoes it.
 void CellThread::arm_devices() {
-  const auto check_stop = [this] {
-    if (control_.stop.load()) throw DriverError("the cell was stopped");
-  };
-  check_stop();
-  if (cell_.robot.status().state == DeviceState::kEnabled) cell_.robot.home();
-  if (cell_.table.status().state == DeviceState::kEnabled) cell_.table.home();
-  check_stop();
+  find_references();
   if (cell_.laser.status().state == DeviceState::kConnected) cell_.laser.enable();
   if (control_.stop.load()) cell_.laser.disable();
   check_stop();
+  const auto check_ready = [](const char* name, const auto& status) {
+    if (status.state == DeviceState::kReady) return;
+    throw DriverError(std::string("the ") + name + " is not ready but " + device_state_name(status.state) +
+                      (status.fault.empty() ? "" : ": " + status.fault));
+  };
+  check_ready("robot", cell_.robot.status());
+  check_ready("table", cell_.table.status());
+  check_ready("laser", cell_.laser.status());
 }
 
 void CellThread::home(Done done) {
@@ -197,8 +232,7 @@ void CellThread::home(Done done) {
 }
 
 void CellThread::travel_home() {
-  if (cell_.robot.status().state == DeviceState::kEnabled) cell_.robot.home();
-  if (cell_.table.status().state == DeviceState::kEnabled) cell_.table.home();
+  find_references();
   Joints up = true_joints();
   up[kJ3] = std::max(up[kJ3], description_.axes[kJ3].home);
   Joints table = up;

@@ -112,6 +112,9 @@ class CellThread {
   Loaded load(const PaintOrder& order) const;
   static PaintTally tally(const Loaded& loaded);
   Joints true_joints() const;
+  void check_stop() const;
+  void clear_devices();
+  void find_references();
   void arm_devices();
   void travel_home();
   void act(std::function<void()> work, Done done);
@@ -127,6 +130,7 @@ class CellThread {
   std::condition_variable woken_;
   std::deque<std::function<void()>> tasks_;       ///< guarded by mutex_
   std::vector<std::function<void(bool)>> stops_;  ///< asked for, not yet carried out; guarded by mutex_
+  bool is_working_ = false;                       ///< the executor's thread; guarded by mutex_
   bool is_ending_ = false;                        ///< guarded by mutex_
   std::thread thread_, stop_thread_;
 };
