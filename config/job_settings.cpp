@@ -24,6 +24,9 @@ const std::vector<std::string> kCurveNames{"hilbert", "peano2", "laminar"};
 const std::vector<std::string> kDensityNames{"texture", "mean_curvature", "gaussian_curvature"};
 const std::vector<std::string> kToneMappingNames{"calibrated", "linear"};
 const std::vector<std::string> kUpNames{"y", "z"};
+const std::vector<std::string> kPlanningNames{"quality", "balanced", "fast"};
+const std::vector<std::string> kOrderNames{"improved", "curve"};
+const std::vector<std::string> kPolicyNames{"search", "follow_normal"};
 
 /// How many dots and how large: of each pair at most one.
 void read_amounts(JsonObject& json, JobSettings& settings) {
@@ -44,6 +47,14 @@ void read_incidence(JsonObject& json, JobSettings& settings) {
     json.refuse("preferred_incidence_deg", "above max_incidence_deg");
   settings.preferred_incidence_deg =
       preferred.value_or(std::min(settings.preferred_incidence_deg, settings.max_incidence_deg));
+}
+
+void read_planning(JsonObject& json, JobSettings& settings) {
+  if (const auto choice = json.optional_choice("planning", kPlanningNames))
+    settings.planning = static_cast<Planning>(*choice);
+  if (const auto choice = json.optional_choice("order", kOrderNames)) settings.order = static_cast<DotOrder>(*choice);
+  if (const auto choice = json.optional_choice("policy", kPolicyNames))
+    settings.policy = static_cast<PosePolicy>(*choice);
 }
 
 /// How this job's object is held.
@@ -99,6 +110,7 @@ JobSettings read_settings(JsonObject& json) {
     settings.untextured = static_cast<Untextured>(*choice);
   read_sampling(json, settings);
   read_incidence(json, settings);
+  read_planning(json, settings);
   read_mounting(json, settings);
   settings.cell = json.optional_text("cell", 4096).value_or(settings.cell);
   settings.dry_run = json.optional_boolean("dry_run").value_or(settings.dry_run);
@@ -140,6 +152,9 @@ std::string job_settings_to_json(const JobSettings& settings) {
       {"tone_curve", tone_mapping_name(settings.tone_curve)},
       {"max_incidence_deg", settings.max_incidence_deg},
       {"preferred_incidence_deg", settings.preferred_incidence_deg},
+      {"planning", planning_name(settings.planning)},
+      {"order", order_name(settings.order)},
+      {"policy", policy_name(settings.policy)},
       {"fixture",
        {{"post_height_mm", or_null(settings.fixture.post_height_mm)},
         {"post_radius_mm", or_null(settings.fixture.post_radius_mm)},
@@ -166,6 +181,18 @@ const char* tone_mapping_name(ToneMapping mapping) {
   return kToneMappingNames[static_cast<std::size_t>(mapping)].c_str();
 }
 
+const char* planning_name(Planning planning) {
+  return kPlanningNames[static_cast<std::size_t>(planning)].c_str();
+}
+
+const char* order_name(DotOrder order) {
+  return kOrderNames[static_cast<std::size_t>(order)].c_str();
+}
+
+const char* policy_name(PosePolicy policy) {
+  return kPolicyNames[static_cast<std::size_t>(policy)].c_str();
+}
+
 const char* untextured_name(Untextured untextured) {
   return kUntexturedNames[static_cast<std::size_t>(untextured)].c_str();
 }
@@ -182,7 +209,10 @@ SampleOptions sample_options(const JobSettings& settings) {
 
 PlanOptions plan_options(const JobSettings& settings) {
   return {.max_incidence = settings.max_incidence_deg * kDegree,
-          .preferred_incidence = settings.preferred_incidence_deg * kDegree};
+          .preferred_incidence = settings.preferred_incidence_deg * kDegree,
+          .planning = settings.planning,
+          .order = settings.order,
+          .policy = settings.policy};
 }
 
 MountingOptions mounting_options(const JobSettings& settings) {

@@ -48,6 +48,9 @@ struct JobSettings {
   ToneMapping tone_curve = ToneMapping::kCalibrated;
   double max_incidence_deg = 45;
   double preferred_incidence_deg = 20;
+  Planning planning = Planning::kBalanced;
+  DotOrder order = DotOrder::kImproved;
+  PosePolicy policy = PosePolicy::kSearch;
   FixtureSettings fixture;
   MountingSettings mounting;
   std::string cell = "default";  ///< name of a shipped cell, or a file
@@ -67,6 +70,9 @@ const char* curve_name(CurveKind curve);             ///< "hilbert", "peano2", "
 const char* density_name(DensitySource density);     ///< "texture", "mean_curvature", "gaussian_curvature"
 const char* untextured_name(Untextured untextured);  ///< "auto", "blank", "material"
 const char* tone_mapping_name(ToneMapping mapping);  ///< "calibrated", "linear"
+const char* planning_name(Planning planning);        ///< "quality", "balanced", "fast"
+const char* order_name(DotOrder order);              ///< "improved", "curve"
+const char* policy_name(PosePolicy policy);          ///< "search", "follow_normal"
 
 SampleOptions sample_options(const JobSettings& settings);
 PlanOptions plan_options(const JobSettings& settings);

@@ -30,11 +30,6 @@ std::vector<Eigen::Vector3d> directions_over_sphere(double spacing) {
   return directions;
 }
 
-double incidence_cost_s(const AimCosts& costs, double cosine) {
-  const double incidence = std::acos(std::clamp(cosine, -1., 1.)) / (20 * kDegree);
-  return costs.incidence_s * incidence * incidence;
-}
-
 /// Facility location: which of the candidate directions become aims.
 class AimLocation {
  public:
@@ -89,7 +84,7 @@ class AimLocation {
     const std::size_t asked = std::min(dots_.size(), costs_.sample);
     weight_ = asked > 0 ? static_cast<double>(dots_.size()) / static_cast<double>(asked) : 0;
     std::vector<std::vector<std::pair<std::uint32_t, float>>> answers(asked);
-    const double cos_preferred = std::cos(dots_.reach().options.preferred_incidence);
+    const double cos_preferred = std::cos(kept_incidence(dots_.reach().options));
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, asked, 16), [&](const auto& range) {
       for (std::size_t s = range.begin(); s < range.end(); ++s) {
         const Target target = dots_.target(s * dots_.size() / asked);
@@ -197,7 +192,7 @@ class BlockOfAims {
   };
 
   void find_candidates(const Target& target) {
-    const double cos_preferred = std::cos(dots_.reach().options.preferred_incidence);
+    const double cos_preferred = std::cos(kept_incidence(dots_.reach().options));
     for (std::size_t k = 0; k < beams_O_.size(); ++k) {
       const double cosine = -beams_O_[k].dot(target.smooth_normal_O);
       if (cosine >= cos_preferred && dots_.is_clear(target, beams_O_[k]))
@@ -257,6 +252,15 @@ class BlockOfAims {
 
 }  // namespace
 
+double kept_incidence(const PlanOptions& options) {
+  return std::max(options.preferred_incidence, 5 * kDegree);
+}
+
+double incidence_cost_s(const AimCosts& costs, double cosine) {
+  const double incidence = std::acos(std::clamp(cosine, -1., 1.)) / (20 * kDegree);
+  return costs.incidence_s * incidence * incidence;
+}
+
 bool AimedDots::is_clear(const Target& target, const Eigen::Vector3d& beam_O) const {
   return -beam_O.dot(target.face_normal_O) >= reach_.cos_max_incidence() &&
          reach_.clearance.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
@@ -266,13 +270,13 @@ bool AimedDots::is_clear(const Target& target, const Eigen::Vector3d& beam_O) co
 AimCosts aim_costs(const PlanOptions& options) {
   switch (options.planning) {
     case Planning::kFast:
-      return {.incidence_s = .001, .aim_s = .6, .switch_s = .02, .spacing = 7 * kDegree, .sample = 1500};
+      return {.incidence_s = .001, .aim_s = .6, .switch_s = .02, .spacing = 7 * kDegree, .sample = 1500, .kicks = 0};
     case Planning::kBalanced:
-      return {.incidence_s = .008, .aim_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000};
+      return {.incidence_s = .008, .aim_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000, .kicks = 1};
     case Planning::kQuality:
       break;
   }
-  return {.incidence_s = .06, .aim_s = .6, .switch_s = .02, .spacing = 4 * kDegree, .sample = 6000};
+  return {.incidence_s = .06, .aim_s = .6, .switch_s = .02, .spacing = 4 * kDegree, .sample = 6000, .kicks = 4};
 }
 
 Aims choose_aims(const AimedDots& dots, const AimCosts& costs) {

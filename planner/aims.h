@@ -39,8 +39,12 @@ struct AimCosts {
   double switch_s = 0;     ///< of another aim from one dot of the curve to the next: a tour that is torn
   double spacing = 0;      ///< rad, between the directions to choose from
   std::size_t sample = 0;  ///< dots that are asked
+  std::size_t kicks = 0;   ///< a dot, see ordering.h
 };
 AimCosts aim_costs(const PlanOptions& options);
+double incidence_cost_s(const AimCosts& costs, double cosine);
+/// The preferred incidence that is kept: never less than what the directions to choose from are apart.
+double kept_incidence(const PlanOptions& options);
 
 constexpr std::uint16_t kNoAim = UINT16_MAX;
 

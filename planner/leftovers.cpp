@@ -40,8 +40,7 @@ class Leftovers {
         if (!pose) continue;
         left_[i].is_reachable = true;
         left_[i].station = {pose->table.tilt, pose->table.rotation, pose->yaw, pose->elbow};
-        left_[i].cos_allowed =
-            std::cos(std::max(reach_.options.preferred_incidence, pose->from_smooth + kIncidenceSlack));
+        left_[i].cos_allowed = std::cos(std::max(kept_incidence(reach_.options), pose->from_smooth + kIncidenceSlack));
       }
     });
     for (std::size_t i = 0; i < left.size(); ++i)

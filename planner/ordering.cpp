@@ -3,51 +3,31 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 
 namespace hilbrush {
 namespace {
 
 constexpr std::size_t kNeighbours = 8;
-constexpr std::int64_t kWindow = 5000;   // places that one move may shift or reverse
+constexpr std::int64_t kWindow = 5000;  // places that one move may shift or reverse
+constexpr std::int64_t kKickWindow = 1000;
 constexpr std::size_t kBlock = 1 << 15;  // dots that are improved together
 constexpr std::int32_t kNone = -1;       // beyond an end of the path
 constexpr float kLeastGainS = 1e-6F;
 
-/// Move and settle between two dots, the table at rest.
-class StepCost {
+/// The cost of a step; beyond the ends of the path there is none.
+class PathCost {
  public:
-  StepCost(const CellDescription& cell, std::span<const PathDot> path) : path_(path) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      const AxisDescription& axis = cell.axes[i];
-      acceleration_[i] = static_cast<float>(axis.acceleration_max);
-      speed_[i] = static_cast<float>(axis.speed_max);
-      inverse_saturation_[i] = axis.settle_saturation > 0 ? static_cast<float>(1 / axis.settle_saturation) : 0;
-    }
-    tick_s_ = static_cast<float>(cell.timing.tick_s);
-    settle_span_s_ = static_cast<float>(cell.timing.settle_max_s - cell.timing.settle_min_s);
-  }
+  PathCost(const CellDescription& cell, std::span<const PathDot> path) : path_(path), step_(cell) {}
 
   float operator()(std::int32_t a, std::int32_t b) const {
     if (a == kNone || b == kNone) return 0;
-    const auto &from = path_[static_cast<std::size_t>(a)].arm, &to = path_[static_cast<std::size_t>(b)].arm;
-    float ramping = 0, cruising_s = 0, share = 0;  // the slowest of those that reach full speed and those that don't
-    for (std::size_t i = 0; i < 4; ++i) {
-      const float distance = std::abs(from[i] - to[i]);
-      share = std::max(share, distance * inverse_saturation_[i]);
-      if (distance * acceleration_[i] <= speed_[i] * speed_[i])
-        ramping = std::max(ramping, distance / acceleration_[i]);
-      else
-        cruising_s = std::max(cruising_s, distance / speed_[i] + speed_[i] / acceleration_[i]);
-    }
-    float move_s = std::max(cruising_s, 2 * std::sqrt(ramping));
-    if (tick_s_ > 0) move_s = std::ceil(move_s / tick_s_ - 1e-4F) * tick_s_;
-    return move_s + settle_span_s_ * std::min(1.F, share);
+    return step_(path_[static_cast<std::size_t>(a)].arm, path_[static_cast<std::size_t>(b)].arm);
   }
 
  private:
   std::span<const PathDot> path_;
-  std::array<float, 4> acceleration_{}, speed_{}, inverse_saturation_{};
-  float tick_s_ = 0, settle_span_s_ = 0;
+  StepCost step_;
 };
 
 /// The nearest dots of each dot, by a hash-free grid: dots sorted by cell.
@@ -136,7 +116,8 @@ class Neighbours {
   std::vector<std::int32_t> near_;
 };
 
-/// The path as an array of dots, and its local improvement.
+/// The path as an array of dots, and its local improvement. Whatever is done to the path is done by reversing stretches
+/// of it, so that a list of reversals is all it takes to undo a failed attempt.
 class LocalSearch {
  public:
   LocalSearch(const CellDescription& cell, std::span<const PathDot> path)
@@ -144,26 +125,43 @@ class LocalSearch {
         neighbours_(path),
         dot_at_(path.size()),
         place_of_(path.size()),
-        is_queued_(path.size(), true) {
+        is_queued_(path.size(), false) {
     std::iota(dot_at_.begin(), dot_at_.end(), 0);
     std::iota(place_of_.begin(), place_of_.end(), 0);
   }
 
-  std::vector<std::int32_t> run() {
-    constexpr std::size_t kLooksADot = 40;  // a bound; a few are usual
-    std::vector<std::int32_t> queue = dot_at_, next;
-    for (std::size_t looks = 0; !queue.empty() && looks < kLooksADot * dot_at_.size();) {
-      next.clear();
-      next_ = &next;
-      for (const std::int32_t dot : queue) {
-        is_queued_[static_cast<std::size_t>(dot)] = false;
-        for (++looks; improve(dot); ++looks) {
-        }
-      }
-      queue.swap(next);
-    }
-    return std::move(dot_at_);
+  void descend() {
+    for (const std::int32_t dot : std::vector<std::int32_t>(dot_at_)) queue_again(dot);
+    settle(40 * dot_at_.size());  // a bound; a few looks at each dot are usual
   }
+
+  /// Swaps neighbouring stretches here and there, descends from there, and keeps what is no worse.
+  void perturb(std::size_t kicks) {
+    constexpr std::int64_t kLongest = 30;
+    const auto count = static_cast<std::int64_t>(dot_at_.size());
+    if (count < 8) return;
+    window_ = kKickWindow;
+    is_logging_ = true;
+    std::minstd_rand random(1);
+    const auto below = [&](std::int64_t bound) {
+      return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(bound));
+    };
+    for (std::size_t k = 0; k < kicks; ++k) {
+      log_.clear();
+      gained_s_ = 0;
+      const std::int64_t longest = std::min(kLongest, count / 3), first = below(count - 2);
+      const std::int64_t middle = std::min(first + 1 + below(longest), count - 1);
+      const std::int64_t end = std::min(middle + 1 + below(longest), count);
+      swap_stretches(first, middle, end);
+      settle(1000);
+      if (gained_s_ >= -kLeastGainS) continue;
+      is_logging_ = false;
+      for (auto it = log_.rbegin(); it != log_.rend(); ++it) reverse(it->first, it->second);
+      is_logging_ = true;
+    }
+  }
+
+  const std::vector<std::int32_t>& path() const { return dot_at_; }
 
  private:
   std::int64_t place(std::int32_t dot) const { return place_of_[static_cast<std::size_t>(dot)]; }
@@ -174,10 +172,21 @@ class LocalSearch {
   void queue_again(std::int32_t dot) {
     if (dot == kNone || is_queued_[static_cast<std::size_t>(dot)]) return;
     is_queued_[static_cast<std::size_t>(dot)] = true;
-    next_->push_back(dot);
+    queue_.push_back(dot);
   }
 
-  bool improve(std::int32_t dot) { return two_opt(dot) || move_segment(dot); }
+  /// Improves around the queued dots until nothing improves, or `looks_at_most` have been looked at.
+  void settle(std::size_t looks_at_most) {
+    std::size_t looks = 0;
+    for (std::size_t next = 0; next < queue_.size(); ++next) {
+      const std::int32_t dot = queue_[next];
+      is_queued_[static_cast<std::size_t>(dot)] = false;
+      if (looks >= looks_at_most) continue;
+      for (++looks; two_opt(dot) || move_segment(dot); ++looks) {
+      }
+    }
+    queue_.clear();
+  }
 
   /// Replaces the edge from `a` to its successor (or predecessor) and one at a neighbour.
   bool two_opt(std::int32_t a) {
@@ -188,11 +197,13 @@ class LocalSearch {
         const float new_s = cost_(a, c);
         if (new_s >= edge_s) continue;
         const std::int32_t d = at(place(c) + side);
-        if (edge_s + cost_(c, d) - new_s - cost_(b, d) <= kLeastGainS) continue;
+        const float gain_s = edge_s + cost_(c, d) - new_s - cost_(b, d);
+        if (gain_s <= kLeastGainS) continue;
         const std::int64_t first = side > 0 ? std::min(place(a), place(c)) + 1 : std::min(place(a), place(c));
         const std::int64_t last = side > 0 ? std::max(place(a), place(c)) : std::max(place(a), place(c)) - 1;
-        if (last - first >= kWindow) continue;
+        if (last - first >= window_) continue;
         reverse(first, last);
+        gained_s_ += gain_s;
         for (const std::int32_t end : {a, b, c, d}) queue_again(end);
         return true;
       }
@@ -203,37 +214,41 @@ class LocalSearch {
   /// Moves one to three dots that begin or end with `a` next to a neighbour of `a`.
   bool move_segment(std::int32_t a) {
     for (const std::int64_t side : {1, -1})
-      for (std::int64_t length = 1; length <= 3; ++length) {
-        if (length == 1 && side < 0) continue;
+      for (std::int64_t length = side > 0 ? 1 : 2; length <= 3; ++length) {
         const std::int32_t e = at(place(a) + side * (length - 1));  // the segment's other end
         if (e == kNone) break;
-        const std::int32_t before = at(place(a) - side), after = at(place(e) + side);
-        const float removed_s = cost_(before, a) + cost_(e, after) - cost_(before, after);
-        if (removed_s <= kLeastGainS) continue;
-        for (const std::int32_t c : neighbours_.of(a)) {
-          const std::int64_t offset = (place(c) - place(a)) * side;
-          if (offset >= 0 && offset < length) continue;
-          if (std::abs(offset) >= kWindow) continue;
-          const float joint_s = cost_(c, a);
-          if (joint_s >= removed_s) continue;
-          for (const std::int64_t beyond : {1, -1}) {
-            const std::int32_t d = at(place(c) + beyond);
-            if (d == a || d == e) continue;  // the edge that is taken away
-            if (removed_s + cost_(c, d) - joint_s - cost_(e, d) <= kLeastGainS) continue;
-            insert(a, e, c, beyond);
-            for (const std::int32_t end : {a, e, before, after, c, d}) queue_again(end);
-            return true;
-          }
-        }
+        if (move_segment(a, e, side, length)) return true;
       }
     return false;
   }
 
-  void reverse(std::int64_t first, std::int64_t last) {
-    std::reverse(dot_at_.begin() + first, dot_at_.begin() + last + 1);
-    renumber(first, last);
+  bool move_segment(std::int32_t a, std::int32_t e, std::int64_t side, std::int64_t length) {
+    const std::int32_t before = at(place(a) - side), after = at(place(e) + side);
+    const float removed_s = cost_(before, a) + cost_(e, after) - cost_(before, after);
+    if (removed_s <= kLeastGainS) return false;
+    for (const std::int32_t c : neighbours_.of(a)) {
+      const std::int64_t offset = (place(c) - place(a)) * side;
+      if ((offset >= 0 && offset < length) || std::abs(offset) >= window_) continue;
+      const float joint_s = cost_(c, a);
+      if (joint_s >= removed_s) continue;
+      for (const std::int64_t beyond : {1, -1}) {
+        const std::int32_t d = at(place(c) + beyond);
+        if (d == a || d == e) continue;  // the edge that is taken away
+        const float gain_s = removed_s + cost_(c, d) - joint_s - cost_(e, d);
+        if (gain_s <= kLeastGainS) continue;
+        insert(a, e, c, beyond);
+        gained_s_ += gain_s;
+        for (const std::int32_t end : {a, e, before, after, c, d}) queue_again(end);
+        return true;
+      }
+    }
+    return false;
   }
-  void renumber(std::int64_t first, std::int64_t last) {
+
+  void reverse(std::int64_t first, std::int64_t last) {
+    if (first >= last) return;
+    if (is_logging_) log_.emplace_back(first, last);
+    std::reverse(dot_at_.begin() + first, dot_at_.begin() + last + 1);
     for (std::int64_t p = first; p <= last; ++p)
       place_of_[static_cast<std::size_t>(dot_at_[static_cast<std::size_t>(p)])] = static_cast<std::int32_t>(p);
   }
@@ -241,31 +256,49 @@ class LocalSearch {
   /// The segment from `a` to `e` goes between `c` and the dot `beyond` it, `a` next to `c`.
   void insert(std::int32_t a, std::int32_t e, std::int32_t c, std::int64_t beyond) {
     const std::int64_t first = std::min(place(a), place(e)), last = std::max(place(a), place(e)), to = place(c);
-    const auto begin = dot_at_.begin();
-    const bool is_a_first = place(a) <= place(e);
     // Reading along the path, a segment put behind c begins with a; one put before c ends with it.
-    if (is_a_first != (beyond > 0)) std::reverse(begin + first, begin + last + 1);
+    const bool keeps_direction = (place(a) <= place(e)) == (beyond > 0);
+    // One reversal swaps the segment with what it passes; each is then turned back if need be.
+    const std::int64_t length = last - first + 1;
     if (to > last) {
-      const std::int64_t end = beyond > 0 ? to + 1 : to;  // the segment's end, exclusive
-      std::rotate(begin + first, begin + last + 1, begin + end);
-      renumber(first, end - 1);
+      const std::int64_t end = beyond > 0 ? to : to - 1;
+      reverse(first, end);
+      reverse(first, end - length);
+      if (keeps_direction) reverse(end - length + 1, end);
     } else {
       const std::int64_t start = beyond > 0 ? to + 1 : to;
-      std::rotate(begin + start, begin + first, begin + last + 1);
-      renumber(start, last);
+      reverse(start, last);
+      reverse(start + length, last);
+      if (keeps_direction) reverse(start, start + length - 1);
     }
   }
 
-  StepCost cost_;
+  /// The places [first, middle) and [middle, end).
+  void swap_stretches(std::int64_t first, std::int64_t middle, std::int64_t end) {
+    const std::int32_t a = at(first - 1), b = at(first), c = at(middle - 1), d = at(middle), e = at(end - 1),
+                       f = at(end);
+    gained_s_ += cost_(a, b) + cost_(c, d) + cost_(e, f) - cost_(a, d) - cost_(e, b) - cost_(c, f);
+    reverse(first, end - 1);
+    reverse(first, first + (end - middle) - 1);
+    reverse(first + (end - middle), end - 1);
+    for (const std::int32_t dot : {a, b, c, d, e, f}) queue_again(dot);
+  }
+
+  PathCost cost_;
   Neighbours neighbours_;
   std::vector<std::int32_t> dot_at_, place_of_;
   std::vector<bool> is_queued_;
-  std::vector<std::int32_t>* next_ = nullptr;
+  std::vector<std::int32_t> queue_;
+  std::int64_t window_ = kWindow;
+  float gained_s_ = 0;
+  bool is_logging_ = false;
+  std::vector<std::pair<std::int64_t, std::int64_t>> log_;  ///< reversals since the last kick
 };
 
 }  // namespace
 
-std::vector<std::uint32_t> improved_order(const CellDescription& cell, std::span<const PathDot> path) {
+std::vector<std::uint32_t> improved_order(const CellDescription& cell, std::span<const PathDot> path,
+                                          std::size_t kicks) {
   std::vector<std::uint32_t> order;
   order.reserve(path.size());
   const std::size_t block_count = (path.size() + kBlock - 1) / kBlock;
@@ -275,7 +308,10 @@ std::vector<std::uint32_t> improved_order(const CellDescription& cell, std::span
       for (std::size_t i = begin; i < end; ++i) order.push_back(static_cast<std::uint32_t>(i));
       continue;
     }
-    for (const std::int32_t dot : LocalSearch(cell, path.subspan(begin, end - begin)).run())
+    LocalSearch search(cell, path.subspan(begin, end - begin));
+    search.descend();
+    search.perturb(kicks * (end - begin));
+    for (const std::int32_t dot : search.path())
       order.push_back(static_cast<std::uint32_t>(begin + static_cast<std::size_t>(dot)));
   }
   return order;

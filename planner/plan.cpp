@@ -63,20 +63,26 @@ Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress&
 TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program, const TimeVisitor& visit) {
   TimeSplit time;
   Joints at = home_joints(cell);
+  double ringing_s = 0;  // what passing a way-point without settling has left over, see Run::move of the executor
+  const auto move_to = [&](const Joints& to, double& spent_s) {
+    const double travel_s = move_s(cell, at, to);
+    ringing_s = std::max(settle_s(cell, at, to), ringing_s - travel_s);
+    spent_s += travel_s + cell.timing.message_s;
+    at = to;
+  };
   std::size_t next_via = 0;
   for (std::size_t i = 0; i <= program.exposures.size(); ++i) {
     bool is_repose = false;
     for (; next_via < program.vias.size() && program.vias[next_via].before_exposure <= i; ++next_via) {
-      time.retract_s += move_s(cell, at, program.vias[next_via].joints) + cell.timing.message_s;
-      at = program.vias[next_via].joints;
+      move_to(program.vias[next_via].joints, time.retract_s);
       is_repose = true;
     }
     if (i == program.exposures.size()) break;
     const Exposure& exposure = program.exposures[i];
-    (is_repose ? time.retract_s : time.move_s) += move_s(cell, at, exposure.joints) + cell.timing.message_s;
-    time.settle_s += settle_s(cell, at, exposure.joints);
+    move_to(exposure.joints, is_repose ? time.retract_s : time.move_s);
+    time.settle_s += ringing_s;
+    ringing_s = 0;
     time.expose_s += static_cast<double>(exposure.pulse_s) + cell.timing.message_s;
-    at = exposure.joints;
     if (visit) visit(i, time);
   }
   return time;
@@ -91,7 +97,7 @@ std::vector<Joints> plan_approach(const Reach& reach, const ExposureProgram& pro
     if (!(from[i] >= axis.min - 1e-6 && from[i] <= axis.max + 1e-6))
       throw InputError("from", std::string("the joint ") + kAxisNames[i] + " is outside its limits");
   }
-  const auto way = Transit(implementation).route(from, program.exposures[next].joints);
+  const auto way = Transit(implementation).route_by_search(from, program.exposures[next].joints);
   if (!way)
     throw InputError("from", "no clear way leads to exposure " + std::to_string(next) +
                                  ": jog the arm clear of the object, then ask again");

@@ -24,9 +24,9 @@ enum class PosePolicy {
 };
 
 struct PlanOptions {
-  double max_incidence = std::numbers::pi / 4;  ///< rad, against the face normal; never exceeded
-  double preferred_incidence =
-      std::numbers::pi / 9;  ///< rad, against the smooth normal; exceeded only where a dot cannot be exposed within it
+  double max_incidence = std::numbers::pi / 4;        ///< rad, against the face normal; never exceeded
+  double preferred_incidence = std::numbers::pi / 9;  ///< rad, against the smooth normal; exceeded only where a dot
+                                                      ///< cannot be exposed within it. Less than 5 degrees count as 5
   Planning planning = Planning::kBalanced;
   DotOrder order = DotOrder::kImproved;
   PosePolicy policy = PosePolicy::kSearch;

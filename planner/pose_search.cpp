@@ -3,10 +3,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "planner/leftovers.h"
 #include "planner/ordering.h"
 #include "planner/stations.h"
+#include "planner/yaw_slack.h"
+#include "sampling/check.h"
 
 namespace hilbrush {
 namespace {
@@ -40,34 +44,47 @@ Joints wind(const Reach::Implementation& reach, const Eigen::Vector3d& first_O, 
   station.rotation = reach.kinematics.wind(kRotation, station.rotation, before[kRotation]);
   // J4 keeps clear of its ends, so that it need not unwind within the tour.
   const double middle = (reach.kinematics.axis_min(kJ4) + reach.kinematics.axis_max(kJ4)) / 2;
-  const double half = std::max(0., (reach.kinematics.axis_max(kJ4) - reach.kinematics.axis_min(kJ4)) / 2 - 1);
-  Joints reference = before;
-  reference[kJ4] = std::clamp(before[kJ4], middle - half, middle + half);
-  const auto joints = joints_at(reach, station, first_O, reference);
+  const double half =
+      std::max(std::numbers::pi, (reach.kinematics.axis_max(kJ4) - reach.kinematics.axis_min(kJ4)) / 2 - 1);
+  auto joints = joints_at(reach, station, first_O, before);
+  if (joints && std::abs((*joints)[kJ4] - middle) > half) {
+    Joints reference = *joints;
+    reference[kJ4] -= std::copysign(2 * std::numbers::pi, reference[kJ4] - middle);
+    joints = joints_at(reach, station, first_O, reference);
+  }
   return joints ? *joints : before;
 }
 
 /// The tour's dots with their joints, in the order in which they are exposed.
-std::vector<PosedDot> posed_tour(const AimedDots& dots, const Tour& tour, const Joints& first, DotOrder order) {
+std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, Tour& tour, const Joints& first) {
   const Reach::Implementation& reach = dots.reach();
-  std::vector<PosedDot> posed;
-  std::vector<PathDot> path;
-  Joints before = first;
+  std::vector<Joints> joints;
+  joints.reserve(tour.dots.size());
   for (const std::uint32_t dot : tour.dots) {
-    const auto joints = joints_at(reach, tour.station, dots.position_O(dot), before);
-    if (!joints) continue;
-    before = *joints;
-    posed.push_back({dots.dot_index(dot), before});
-    if (order == DotOrder::kCurve) continue;
-    PathDot on_path{dots.position_O(dot).cast<float>(), {}};
-    for (std::size_t i = 0; i < 4; ++i) on_path.arm[i] = static_cast<float>(before[i]);
-    path.push_back(on_path);
+    const auto found = joints_at(reach, tour.station, dots.position_O(dot), joints.empty() ? first : joints.back());
+    CHECK(found.has_value());  // misfits have been removed
+    joints.push_back(*found);
   }
-  if (order == DotOrder::kCurve) return posed;
-  std::vector<PosedDot> improved;
-  improved.reserve(posed.size());
-  for (const std::uint32_t i : improved_order(reach.cell, path)) improved.push_back(posed[i]);
-  return improved;
+  if (reach.options.order == DotOrder::kImproved) {
+    std::vector<PathDot> path;
+    path.reserve(joints.size());
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      path.push_back({dots.position_O(tour.dots[i]).cast<float>(), {}});
+      for (std::size_t axis = 0; axis < 4; ++axis) path.back().arm[axis] = static_cast<float>(joints[i][axis]);
+    }
+    const std::vector<std::uint32_t> order = improved_order(reach.cell, path, costs.kicks);
+    const std::vector<Joints> old_joints = joints;
+    const std::vector<std::uint32_t> old_dots = tour.dots;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      joints[i] = old_joints[order[i]];
+      tour.dots[i] = old_dots[order[i]];
+    }
+  }
+  use_yaw_slack(dots, costs, tour.station, tour.dots, joints);
+  std::vector<PosedDot> posed;
+  posed.reserve(joints.size());
+  for (std::size_t i = 0; i < joints.size(); ++i) posed.push_back({dots.dot_index(tour.dots[i]), joints[i]});
+  return posed;
 }
 
 }  // namespace
@@ -78,9 +95,10 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   const auto tell = [&](double fraction) {
     if (progress) progress(fraction);
   };
+  const AimCosts costs = aim_costs(reach.options);
   PosedDots posed;
   std::vector<std::uint32_t> left;
-  std::vector<Tour> tours = tours_of(choose_aims(aimed, aim_costs(reach.options)), left);
+  std::vector<Tour> tours = tours_of(choose_aims(aimed, costs), left);
   tell(.4);
   place_stations(aimed, tours, left);
   remove_misfits(aimed, tours, left);
@@ -99,7 +117,7 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
     first[t] = before = wind(reach, aimed.position_O(tours[t].dots.front()), before, tours[t].station);
   std::vector<std::vector<PosedDot>> parts(tours.size());
   tbb::parallel_for(std::size_t{0}, tours.size(),
-                    [&](std::size_t t) { parts[t] = posed_tour(aimed, tours[t], first[t], reach.options.order); });
+                    [&](std::size_t t) { parts[t] = posed_tour(aimed, costs, tours[t], first[t]); });
   posed.sequence.reserve(dot_indices.size());
   before = home_joints(reach.cell);
   for (auto& part : parts) {

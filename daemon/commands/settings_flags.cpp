@@ -76,7 +76,15 @@ void SettingsFlags::add_to(CLI::App& command) {
   command.add_option("--max-incidence-deg", max_incidence_deg, "never more oblique than this, 1 to 45 (default 45)")
       ->group(group);
   command
-      .add_option("--preferred-incidence-deg", preferred_incidence_deg, "nearer the normal where it pays (default 20)")
+      .add_option("--preferred-incidence-deg", preferred_incidence_deg,
+                  "exceeded only where a dot can't be met within it (default 20)")
+      ->group(group);
+  command.add_option("--planning", planning, "quality (beams nearest the normals), balanced (default) or fast")
+      ->group(group);
+  command.add_option("--order", order, "of the dots: improved (default), or curve: along it as it is")->group(group);
+  command
+      .add_option("--policy", policy,
+                  "search (default), or follow_normal: the table turned for every dot, to compare with")
       ->group(group);
   command
       .add_option("--post-height-mm", post_height_mm, "of the post under the object, 0 to 1000 (default: the cell's)")
@@ -114,8 +122,8 @@ void SettingsFlags::add_paint_flags_to(CLI::App& command) {
 bool SettingsFlags::any() const {
   return !file.empty() || dpi || size_mm || units_mm || max_incidence_deg || preferred_incidence_deg || dots || seed ||
          up || untextured || sampler || curve || density || levels || predictive_rounds || largest_gap_pitches ||
-         fine_passes || tone_curve || cell || post_height_mm || post_radius_mm || plate_radius_mm || turn_deg ||
-         !offset_mm.empty();
+         fine_passes || tone_curve || planning || order || policy || cell || post_height_mm || post_radius_mm ||
+         plate_radius_mm || turn_deg || !offset_mm.empty();
 }
 
 std::string SettingsFlags::to_json(const std::string& base, const std::string& base_origin) const {
@@ -142,6 +150,9 @@ std::string SettingsFlags::to_json(const std::string& base, const std::string& b
   put(json, "seed", seed);
   put(json, "max_incidence_deg", max_incidence_deg);
   put(json, "preferred_incidence_deg", preferred_incidence_deg);
+  put(json, "planning", planning);
+  put(json, "order", order);
+  put(json, "policy", policy);
   put(json, "cell", cell);
   put_inside(json, "fixture", "post_height_mm", post_height_mm);
   put_inside(json, "fixture", "post_radius_mm", post_radius_mm);

@@ -20,7 +20,7 @@ struct SettingsFlags {
   std::optional<double> post_height_mm, post_radius_mm, plate_radius_mm, turn_deg;
   std::vector<double> offset_mm;  ///< three, or none
   std::optional<std::uint64_t> dots, seed, levels, predictive_rounds, fine_passes;
-  std::optional<std::string> up, untextured, sampler, curve, density, tone_curve, cell;
+  std::optional<std::string> up, untextured, sampler, curve, density, tone_curve, planning, order, policy, cell;
 
   /// Declares all flags on `command`; this object must outlive its parsing.
   void add_to(CLI::App& command);

@@ -28,6 +28,7 @@ TEST(JobSettings, NothingGivenMeansTheDefaults) {
       R"({"dpi":100.0,"dots":null,"size_mm":null,"units_mm":null,"up":null,"untextured":"auto","sampler":"centroid",)"
       R"("curve":"hilbert","density":"texture","seed":1,"levels":1,"predictive_rounds":0,"largest_gap_pitches":null,)"
       R"("fine_passes":24,"tone_curve":"calibrated","max_incidence_deg":45.0,"preferred_incidence_deg":20.0,)"
+      R"("planning":"balanced","order":"improved","policy":"search",)"
       R"("fixture":{"post_height_mm":null,"post_radius_mm":null,"plate_radius_mm":null},)"
       R"("mounting":{"offset_mm":[0.0,0.0,0.0],"turn_deg":0.0},"cell":"default","dry_run":false})");
 }
@@ -64,6 +65,9 @@ TEST(JobSettings, RoundTripOfRandomSettings) {
     settings.seed = random();
     settings.max_incidence_deg = uniform(10, 45);
     settings.preferred_incidence_deg = uniform(0, settings.max_incidence_deg);
+    settings.planning = static_cast<Planning>(random() % 3);
+    settings.order = static_cast<DotOrder>(random() % 2);
+    settings.policy = static_cast<PosePolicy>(random() % 2);
     if (random() % 2) settings.fixture.post_height_mm = uniform(0, 1000);
     if (random() % 2) settings.fixture.plate_radius_mm = uniform(1, 2000);
     settings.mounting = {{uniform(-9, 9), uniform(-9, 9), uniform(0, 9)}, uniform(-360, 360)};
@@ -133,6 +137,9 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"max_incidence_deg":46})", "$.max_incidence_deg: expected a number from 1 to 45, found 46"},
       {R"({"max_incidence_deg":30,"preferred_incidence_deg":31})",
        "$.preferred_incidence_deg: above max_incidence_deg"},
+      {R"({"planning":"slow"})", "$.planning: expected \"quality\", \"balanced\" or \"fast\", found \"slow\""},
+      {R"({"order":"random"})", "$.order: expected \"improved\" or \"curve\", found \"random\""},
+      {R"({"policy":"none"})", "$.policy: expected \"search\" or \"follow_normal\", found \"none\""},
       {R"({"fixture":{"post_height_mm":-1}})", "$.fixture.post_height_mm: expected a number from 0 to 1000, found -1"},
       {R"({"fixture":{"post":3}})", "$.fixture.post: unknown key"},
       {R"({"mounting":{"offset_mm":[1,2]}})", "$.mounting.offset_mm: expected a list of 3 numbers, found a list of 2"},
