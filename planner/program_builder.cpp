@@ -16,6 +16,10 @@ namespace {
 
 constexpr std::size_t kBlock = 8192;  // dots whose ways are looked for at once
 
+constexpr std::size_t kSearchesFailed = 100;
+constexpr const char* kNoWay = "no clear way leads to a pose for it";
+constexpr const char* kNoWayBack = "no clear way leads back from it";
+
 using Way = std::optional<std::vector<Joints>>;
 
 class ProgramBuilder {
@@ -47,25 +51,42 @@ class ProgramBuilder {
   void add_stranded() {
     const std::vector<PosedDot> stranded = std::move(stranded_);
     stranded_.clear();
+    std::size_t failures = 0;
     for (const PosedDot& posed : stranded) {
-      if (const Way way = transit_.route(now_, posed.joints)) {
+      // Where dots are stranded by the thousand, searching for each of them would take hours.
+      const auto way_to = [&](const Joints& joints) {
+        return failures < kSearchesFailed ? transit_.route_by_search(now_, joints) : transit_.route(now_, joints);
+      };
+      if (const Way way = way_to(posed.joints)) {
         expose(posed, *way);
         continue;
       }
       const auto pose = reach_.find_pose(target_of(dots_.dots[posed.dot_index]), now_);
-      const Way way = pose ? transit_.route(now_, pose->joints) : std::nullopt;
-      if (way)
+      const Way way = pose ? way_to(pose->joints) : std::nullopt;
+      if (way) {
         expose({posed.dot_index, pose->joints}, *way);
-      else
-        plan_.skipped.push_back({posed.dot_index, SkipReason::kNoWay, "no clear way leads to a pose for it",
-                                 "no clear way leads to a pose for it"});
+      } else {
+        ++failures;
+        plan_.skipped.push_back({posed.dot_index, SkipReason::kNoWay, kNoWay, kNoWay});
+      }
     }
   }
 
+  /// A dot from which no way leads home is not gone to.
   void go_home() {
     const Joints home = home_joints(reach_.cell);
-    if (const Way way = transit_.route(now_, home))
-      for (const Joints& via : *way) add_via(via);
+    std::vector<Exposure>& exposures = plan_.program.exposures;
+    std::vector<Via>& vias = plan_.program.vias;
+    while (!exposures.empty()) {
+      if (const Way way = transit_.route_by_search(now_, home)) {
+        for (const Joints& via : *way) add_via(via);
+        break;
+      }
+      plan_.skipped.push_back({exposures.back().dot_index, SkipReason::kNoWay, kNoWayBack, kNoWayBack});
+      exposures.pop_back();
+      while (vias.size() > 1 && vias.back().before_exposure == exposures.size()) vias.pop_back();
+      now_ = exposures.empty() ? home : exposures.back().joints;
+    }
     add_via(home);
   }
 

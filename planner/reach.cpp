@@ -12,8 +12,6 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 /// Against rounding of normals to single precision, so that no exposure exceeds the limit by an ulp.
 constexpr double kIncidenceGuard = 1e-4;
-/// A beam that is blocked nearer than this to the dot is not looked at again.
-constexpr double kDeepM = .01;
 constexpr double kTiltStep = 7.5 * kDegree, kFineTiltStep = 2.5 * kDegree;
 
 /// Evenly from `first` to `last`, both included, at most `step` apart.
@@ -159,11 +157,10 @@ std::optional<DotPose> Reach::Implementation::find_pose(const Target& target, co
                                                         SkippedDot* skipped) const {
   auto pose = find_pose_quickly(target, reference);
   if (!pose) {
-    // Why not, is asked while looking more closely. A third look is for windows that are narrower still: it follows
-    // unless everything in sight is near and blocks the beam.
+    // Why not, is asked while looking more closely. A third look is for windows that are narrower still.
     FailureTally tally;
     pose = search_cone(target, target.face_normal_O, fine_cone_, tilts_, reference, &tally);
-    if (!pose && tally.got_past(kDeepM))
+    if (!pose && tally.is_nearly_reached())
       pose = search_cone(target, target.face_normal_O, finest_cone_, fine_tilts_, reference, nullptr);
     if (!pose && skipped) tally.tell(*skipped);
   }

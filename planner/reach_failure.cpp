@@ -120,6 +120,29 @@ void FailureTally::limit(const LimitExcess& excess) {
   if (is_better(kLimit, excess.amount)) axis_ = excess.axis, amount_ = excess.amount;
 }
 
+bool FailureTally::is_nearly_reached() const {
+  // The second look's steps are 5 degrees of direction and 7.5 of tilt: half of that turns the object, within .2 m of
+  // the axis, by less than this.
+  constexpr double kLengthM = .02, kAngle = 12 * kDegree, kTiltAngle = 5 * kDegree;
+  // A window that is missed is narrow; a beam that is blocked near the dot is nowhere near one.
+  constexpr double kDeepM = .01;
+  switch (stage_) {
+    case kNone:
+      return true;
+    case kBeam:
+      return what_ == Obstruction::kBeamTable || amount_ >= kDeepM;
+    case kTable:
+      return amount_ <= kTiltAngle;
+    case kLimit:
+      return amount_ <= (axis_ == kJ3 || axis_ == kAxisCount ? kLengthM : kAngle);
+    case kLens:
+    case kQuill:
+    case kLinks:
+      return amount_ <= kLengthM;
+  }
+  return true;
+}
+
 void FailureTally::tell(SkippedDot& skipped) const {
   const auto millimetres = [this] { return number(amount_ * 1e3) + " mm"; };
   const auto degrees = [this] { return number(amount_ / kDegree) + " degrees"; };

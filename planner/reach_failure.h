@@ -19,10 +19,8 @@ class FailureTally {
   void links(const Shortfall& shortfall);
 
   void tell(SkippedDot& skipped) const;
-  /// Whether some candidate's beam was free, or the object blocked it no nearer than `free_m` to the dot.
-  bool got_past(double free_m) const {
-    return stage_ > kBeam || (what_ == Obstruction::kBeamObject && amount_ >= free_m);
-  }
+  /// Whether so little is missing that finer directions and tilts might find it.
+  bool is_nearly_reached() const;
 
  private:
   /// The checks in their order: who fails a later one came farther.

@@ -26,18 +26,17 @@ double covered(double distance, const AxisDescription& axis, double time_s) {
   return .5 * a * ramp_s * ramp_s + v * (time_s - ramp_s);
 }
 
-/// What is never done close to the object: the elbow going over, J4 or C unwinding.
-bool needs_retract(const Joints& from, const Joints& to) {
-  constexpr double kHalfTurn = std::numbers::pi;
-  return (from[kJ2] >= 0) != (to[kJ2] >= 0) || std::abs(to[kJ4] - from[kJ4]) > kHalfTurn ||
-         std::abs(to[kRotation] - from[kRotation]) > kHalfTurn;
-}
-
 Elbow elbow_of(const Joints& joints) {
   return joints[kJ2] >= 0 ? Elbow::kPositive : Elbow::kNegative;
 }
 
 }  // namespace
+
+bool Transit::needs_retract(const Joints& from, const Joints& to) {
+  constexpr double kHalfTurn = std::numbers::pi;
+  return (from[kJ2] >= 0) != (to[kJ2] >= 0) || std::abs(to[kJ4] - from[kJ4]) > kHalfTurn ||
+         std::abs(to[kRotation] - from[kRotation]) > kHalfTurn;
+}
 
 Joints joints_during(const CellDescription& cell, const Joints& from, const Joints& to, double time_s) {
   Joints now = to;

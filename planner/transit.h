@@ -21,7 +21,15 @@ class Transit {
   /// Nothing if none is.
   std::optional<std::vector<Joints>> route(const Joints& from, const Joints& to) const;
 
+  /// The same, then a search all over the joints: for the few moves that have to be found. Deterministic. Cost: some 30
+  /// ms where there is nothing to find.
+  std::optional<std::vector<Joints>> route_by_search(const Joints& from, const Joints& to) const;
+
  private:
+  /// What is never done close to the object: the elbow going over, J4 or C unwinding.
+  static bool needs_retract(const Joints& from, const Joints& to);
+  std::optional<std::vector<Joints>> search(const Joints& from, const Joints& to) const;
+  std::vector<Joints> shortened(std::vector<Joints> way) const;
   /// The tool drawn back along its beam, as far as `distance_m` or the limits allow; nothing if the arm cannot.
   std::optional<Joints> backed_off(const Joints& joints, double distance_m) const;
   Joints lifted(Joints joints) const;
