@@ -1,11 +1,15 @@
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <map>
 #include <random>
 #include <set>
@@ -26,7 +30,8 @@ using test::LineClient;
 /// The program hilbrushd in a process of its own, which can be killed as no daemon in this process could.
 class DaemonProcess {
  public:
-  explicit DaemonProcess(const DaemonOptions& options) {
+  /// `environment`: NAME=value, on top of this process's own.
+  explicit DaemonProcess(const DaemonOptions& options, std::vector<std::string> environment = {}) {
     const std::string program = std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd";
     std::vector<std::string> arguments{program,
                                        "--socket",
@@ -44,7 +49,11 @@ class DaemonProcess {
     std::vector<char*> argv;
     for (auto& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
-    EXPECT_EQ(::posix_spawn(&pid_, program.c_str(), nullptr, nullptr, argv.data(), environ), 0);
+    std::vector<char*> envp;
+    for (auto& variable : environment) envp.push_back(variable.data());
+    for (char** variable = environ; *variable != nullptr; ++variable) envp.push_back(*variable);
+    envp.push_back(nullptr);
+    EXPECT_EQ(::posix_spawn(&pid_, program.c_str(), nullptr, nullptr, argv.data(), envp.data()), 0);
   }
   ~DaemonProcess() { end(SIGKILL); }
   DaemonProcess(const DaemonProcess&) = delete;
@@ -208,6 +217,55 @@ TEST(ServerKillTest, AFullDiskStopsTheJobAndNothingElse) {
   EXPECT_EQ(done.at("dots").at("in_doubt").get<int>() + done.at("dots").at("exposed").get<int>(), 600);
   expect_painted_once(world.job_folder(id), done);
   EXPECT_EQ(client->result("system.info").at("system").at("store_fault"), nullptr);
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
+}
+
+/// What systemd is told: the other end of its notification socket.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::filesystem::path& path) : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    EXPECT_EQ(::bind(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  }
+  ~NotifySocket() { ::close(fd_); }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+  /// The next message, or nothing within `patience`.
+  std::string next(std::chrono::milliseconds patience) {
+    pollfd polled{fd_, POLLIN, 0};
+    if (::poll(&polled, 1, static_cast<int>(patience.count())) <= 0) return "";
+    char text[1000];
+    const ssize_t count = ::recv(fd_, text, sizeof text, 0);
+    return {text, static_cast<std::size_t>(std::max<ssize_t>(count, 0))};
+  }
+
+ private:
+  int fd_;
+};
+
+TEST(ServerKillTest, TellsSystemdThatItIsReadyAliveAndEnding) {
+  if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
+  DaemonWorld world;
+  const auto path = world.folder() / "notify";
+  NotifySocket systemd(path);
+  DaemonProcess daemon(world.options, {"NOTIFY_SOCKET=" + path.string(), "WATCHDOG_USEC=400000"});
+  using std::chrono::milliseconds;
+  EXPECT_EQ(systemd.next(milliseconds(20000)), "READY=1");
+  EXPECT_NO_THROW(LineClient client(world.options.socket)) << "ready means that it answers";
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(systemd.next(milliseconds(5000)), "WATCHDOG=1");
+  ::kill(daemon.pid(), SIGSTOP);
+  while (!systemd.next(milliseconds(100)).empty()) {
+  }
+  EXPECT_EQ(systemd.next(milliseconds(500)), "") << "a frozen daemon feeds no watchdog";
+  ::kill(daemon.pid(), SIGCONT);
+  EXPECT_EQ(systemd.next(milliseconds(5000)), "WATCHDOG=1");
+  ::kill(daemon.pid(), SIGTERM);
+  std::string last;
+  for (std::string message; message != "STOPPING=1" && !(message = systemd.next(milliseconds(5000))).empty();)
+    last = message;
+  EXPECT_EQ(last, "STOPPING=1");
   EXPECT_EQ(daemon.end(SIGTERM), 0);
 }
 
