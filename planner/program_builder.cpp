@@ -16,8 +16,9 @@ namespace {
 
 constexpr std::size_t kBlock = 8192;  // dots whose ways are looked for at once
 
-constexpr std::size_t kSearchesFailed = 100;
+constexpr std::size_t kSearchesFailed = 30;
 constexpr const char* kNoWay = "no clear way leads to a pose for it";
+constexpr const char* kNoWayOut = "the arm would touch something at home already";
 constexpr const char* kNoWayBack = "no clear way leads back from it";
 
 using Way = std::optional<std::vector<Joints>>;
@@ -52,10 +53,13 @@ class ProgramBuilder {
     const std::vector<PosedDot> stranded = std::move(stranded_);
     stranded_.clear();
     std::size_t failures = 0;
+    const bool is_home_clear = transit_.is_clear_at(home_joints(reach_.cell));
+    const char* const why = is_home_clear ? kNoWay : kNoWayOut;
     for (const PosedDot& posed : stranded) {
       // Where dots are stranded by the thousand, searching for each of them would take hours.
       const auto way_to = [&](const Joints& joints) {
-        return failures < kSearchesFailed ? transit_.route_by_search(now_, joints) : transit_.route(now_, joints);
+        return is_home_clear && failures < kSearchesFailed ? transit_.route_by_search(now_, joints)
+                                                           : transit_.route(now_, joints);
       };
       if (const Way way = way_to(posed.joints)) {
         expose(posed, *way);
@@ -67,7 +71,7 @@ class ProgramBuilder {
         expose({posed.dot_index, pose->joints}, *way);
       } else {
         ++failures;
-        plan_.skipped.push_back({posed.dot_index, SkipReason::kNoWay, kNoWay, kNoWay});
+        plan_.skipped.push_back({posed.dot_index, SkipReason::kNoWay, why, why});
       }
     }
   }

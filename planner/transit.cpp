@@ -77,6 +77,10 @@ double Transit::least_slack_m(const Joints& from) const {
   return std::clamp(.5 * slack_m, kLeastSlackOfEscapeM, kLeastSlackM);
 }
 
+bool Transit::is_clear_at(const Joints& joints) const {
+  return reach_.clearance.slack_m(reach_.kinematics, joints) >= kLeastSlackM;
+}
+
 bool Transit::is_clear(const Joints& from, const Joints& to) const {
   const double least_m = least_slack_m(from);
   const auto slack_at = [&](const Joints& joints) { return reach_.clearance.slack_m(reach_.kinematics, joints); };

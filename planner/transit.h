@@ -13,6 +13,8 @@ class Transit {
  public:
   explicit Transit(const Reach::Implementation& reach) : reach_(reach) {}
 
+  /// Whether the arm, at rest there, is far enough from everything to go anywhere.
+  bool is_clear_at(const Joints& joints) const;
   /// Whether the direct move keeps clear all the way.
   bool is_clear(const Joints& from, const Joints& to) const;
 

@@ -109,6 +109,7 @@ std::vector<Joints> Transit::shortened(std::vector<Joints> way) const {
 }
 
 std::optional<std::vector<Joints>> Transit::search(const Joints& from, const Joints& to) const {
+  if (!is_clear_at(to)) return std::nullopt;
   std::array<Tree, 2> trees{Tree{{from, -1}}, Tree{{to, -1}}};
   Sampler sampler(reach_.kinematics, from, to);
   const auto is_passable = [&](const Joints& a, const Joints& b, bool meets_end) {
