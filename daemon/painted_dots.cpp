@@ -11,14 +11,24 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kJointTolerance = 1e-6;  // rad, m: far below a dot, far above rounding
+/// Real axes come to rest beside their targets: within the windows in which they report to be in position. Dots are
+/// farther apart than that, so that the nearest exposure is the one that was meant.
+constexpr double kAngleTolerance = 5e-4, kTravelToleranceM = 5e-5;
 constexpr double kOffTargetM = 10e-6;
 constexpr double kFullPulseShare = .999;  // a pulse that the device ended itself is full
 
-bool same_joints(const Joints& a, const Joints& b) {
-  for (int i = 0; i < kAxisCount; ++i)
-    if (std::abs(a[i] - b[i]) > kJointTolerance) return false;
-  return true;
+double tolerance_of(int axis) {
+  return axis == kJ3 ? kTravelToleranceM : kAngleTolerance;
+}
+
+/// How far apart two poses are, in tolerances of the worst axis.
+double distance_of(const Joints& a, const Joints& b) {
+  double worst = 0;
+  for (int i = 0; i < kAxisCount; ++i) {
+    const auto axis = static_cast<std::size_t>(i);
+    worst = std::max(worst, std::abs(a[axis] - b[axis]) / tolerance_of(i));
+  }
+  return worst;
 }
 
 /// Exposures by their joints: sorted by J1, which nearly always tells them apart.
@@ -28,12 +38,17 @@ class ExposureIndex {
     std::iota(order_.begin(), order_.end(), std::size_t{0});
     std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return j1(a) < j1(b); });
   }
+  /// The exposure whose pose is nearest, if it is within the tolerances.
   std::optional<std::size_t> find(const Joints& joints) const {
-    auto it = std::lower_bound(order_.begin(), order_.end(), joints[kJ1] - kJointTolerance,
-                               [&](std::size_t i, double value) { return j1(i) < value; });
-    for (; it != order_.end() && j1(*it) <= joints[kJ1] + kJointTolerance; ++it)
-      if (same_joints(program_.exposures[*it].joints, joints)) return *it;
-    return std::nullopt;
+    const auto first = std::lower_bound(order_.begin(), order_.end(), joints[kJ1] - kAngleTolerance,
+                                        [&](std::size_t i, double value) { return j1(i) < value; });
+    std::optional<std::size_t> nearest;
+    double least = 1;
+    for (auto it = first; it != order_.end() && j1(*it) <= joints[kJ1] + kAngleTolerance; ++it) {
+      const double distance = distance_of(program_.exposures[*it].joints, joints);
+      if (distance <= least) nearest = *it, least = distance;
+    }
+    return nearest;
   }
 
  private:

@@ -19,7 +19,9 @@ struct PaintedDots {
   HitFigures hits;             ///< of the emissions that fit
 };
 
-/// Emissions are matched to exposures by their joints, in whatever order they were made. Cost O(n log n).
+/// Each emission is matched to the exposure whose joints are nearest to its own, within what real axes are in position
+/// by (half a milliradian, 50 micrometres), in whatever order they were made. Cost O(n log n) and, for each emission,
+/// the exposures within half a milliradian of its J1.
 PaintedDots match_emissions(const ExposureProgram& program, std::span<const Emission> emissions,
                             std::span<const Hit> hits);
 

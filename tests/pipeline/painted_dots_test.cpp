@@ -55,6 +55,26 @@ TEST(PaintedDots, OrderOfEmissionsDoesNotMatter) {
   EXPECT_EQ(dots.hits.off_target, 0U);
 }
 
+TEST(PaintedDots, AxesRestBesideTheirTargets) {
+  PaintedProgram painted(500);
+  // A second exposure a millimetre aside of each: the nearest one is meant.
+  for (std::size_t i = 0; i < 500; ++i) {
+    Exposure neighbour = painted.program.exposures[i];
+    neighbour.joints[kRotation] += 4e-4;
+    painted.program.exposures.push_back(neighbour);
+  }
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> share(-1, 1);
+  for (Emission& emission : painted.emissions)
+    for (std::size_t i = 0; i < emission.joints.size(); ++i)
+      emission.joints[i] += share(random) * (i == kJ3 ? 2e-5 : 1e-4);
+  const PaintedDots dots = match_emissions(painted.program, painted.emissions, painted.hits);
+  EXPECT_EQ(dots.exposed, 500U);
+  EXPECT_EQ(dots.foreign, 0U);
+  EXPECT_EQ(dots.repeated, 0U);
+  EXPECT_EQ(dots.hits.off_target, 0U);
+}
+
 TEST(PaintedDots, ACutPulseIsInDoubtUntilItIsMadeInFull) {
   PaintedProgram painted(10);
   painted.emissions[4].length_s = .002;
