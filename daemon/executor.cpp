@@ -15,6 +15,13 @@ namespace {
 
 constexpr double kGraceS = 5;         ///< how much later than the time model a move may end before it counts as lost
 constexpr double kPulseGraceS = 0.1;  ///< the same for a pulse
+/// However fast the cell's clock runs: this host, its network and its scheduler are no faster.
+constexpr double kWallGraceS = 0.25;
+
+double grace_s(const Clock& clock, double cell_s) {
+  const double wall_of_one = clock.wall_s(1);
+  return wall_of_one > 0 ? std::max(cell_s, kWallGraceS / wall_of_one) : cell_s;
+}
 
 /// Ends a run early without a fault; carries no text because it is thrown on the ordinary way out of a stop or a pause.
 struct RunEnded {
@@ -140,7 +147,7 @@ void Run::prove_laser_off() {
 void Run::check_axes_ready() {
   prove_laser_off();
   // After a stop the axes may still be braking.
-  const double deadline_s = cell_.clock.now_s() + kGraceS;
+  const double deadline_s = cell_.clock.now_s() + grace_s(cell_.clock, kGraceS);
   auto robot = cell_.robot.status();
   auto table = cell_.table.status();
   while ((robot.state == DeviceState::kMoving || table.state == DeviceState::kMoving) &&
@@ -157,6 +164,7 @@ void Run::check_axes_ready() {
   std::copy(robot.positions.begin(), robot.positions.end(), at_.begin());
   std::copy(table.positions.begin(), table.positions.end(), at_.begin() + kTilt);
   idle_since_s_ = cell_.clock.now_s();
+  rung_down_s_ = idle_since_s_ + description_.timing.settle_max_s;  // of a move that a stop has cut short
 }
 
 void Run::check_laser_ready() {
@@ -229,7 +237,7 @@ void Run::move(const Leg& leg, Rest rest) {
   if (leg.moves_table) send(cell_.table, leg, settle);
   at_ = leg.way.back();
   if (rest == Rest::kSettled) journal_.expect(next_exposure_);
-  wait_in_position(now_s + 2 * leg.travel_s + settle + kGraceS);
+  wait_in_position(now_s + 2 * leg.travel_s + settle + grace_s(cell_.clock, kGraceS));
   rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + leg.settle_s;
 }
 
@@ -303,7 +311,7 @@ void Run::check_pulse_conditions(const Laser::Status& laser) {
 /// The pulse's length is the device's business; here is only waited for its end, woken by whatever changes.
 void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
   const double end_s = cell_.clock.now_s() + exposure.pulse_s;
-  const double deadline_s = end_s + kPulseGraceS;
+  const double deadline_s = end_s + grace_s(cell_.clock, kPulseGraceS);
   while (!control_.stop.load()) {
     const auto laser = cell_.laser.status();
     const double now_s = cell_.clock.now_s();

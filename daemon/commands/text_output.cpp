@@ -9,6 +9,7 @@
 #include <sstream>
 #include <vector>
 
+#include "config/job_settings.h"
 #include "daemon/commands/terminal.h"
 
 namespace hilbrush {
@@ -21,7 +22,7 @@ constexpr int kLabelWidth = 15;
 /// "  label:      value\n".
 std::string line(const std::string& label, const std::string& value) {
   std::ostringstream out;
-  out << "  " << std::left << std::setw(kLabelWidth) << printable(label) + ":" << printable(value) << '\n';
+  out << "  " << std::left << std::setw(kLabelWidth - 1) << printable(label) + ":" << ' ' << printable(value) << '\n';
   return out.str();
 }
 
@@ -140,6 +141,22 @@ std::string devices_text(const Json& devices) {
   return text;
 }
 
+/// "size_mm 80, dpi 300": what differs from the defaults.
+std::string settings_text(const Json& settings) {
+  const Json defaults = Json::parse(job_settings_to_json(JobSettings{}), nullptr, false);
+  std::string text;
+  for (const auto& [key, value] : settings.items())
+    if (!value.is_null() && member(defaults, key.c_str()) != value)
+      text += (text.empty() ? "" : ", ") + key + " " + value_text(value);
+  return text.empty() ? "all as by default" : text;
+}
+
+std::string own_time_text(const Json& timing) {
+  const Json& own = member(timing, "own_ms");
+  return "median " + fixed(number_field(own, "median", NAN), 2) + " ms a dot, 99 % under " +
+         fixed(number_field(own, "p99", NAN), 2) + " ms";
+}
+
 void add_fields(const Json& object, const std::string& prefix, std::string& text) {
   for (const auto& [key, value] : object.items()) {
     if (value.is_object() && !value.empty())
@@ -254,11 +271,18 @@ std::string format_job(const Json& job) {
                                                     ? ", about " + format_duration(number_field(job, "eta_s")) + " left"
                                                     : ""));
   if (const Json& dots = member(job, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
+  if (const double copies = number_field(job, "copies"); copies > 1)
+    text += line("copies", format_count(number_field(job, "copies_done")) + " of " + format_count(copies) + " painted");
+  if (member(job, "needs_part_in_place") == true) text += line("part", "must be confirmed to be in its place");
+  if (const Json& timing = member(job, "timing"); timing.is_object()) text += line("own time", own_time_text(timing));
   if (const std::string error = format_job_error(job); !error.empty()) text += line("error", error);
+  if (const Json& settings = member(job, "settings"); settings.is_object())
+    text += line("settings", settings_text(settings));
   if (const Json& warnings = member(job, "warnings"); warnings.is_array())
     for (const Json& warning : warnings) text += line("warning", value_text(warning));
-  static constexpr std::array kShown{"id",    "state", "model", "dry_run", "progress",
-                                     "eta_s", "dots",  "error", "warnings"};
+  static constexpr std::array kShown{"id",     "state",   "model",    "dry_run", "progress",    "eta_s",
+                                     "dots",   "error",   "warnings", "copies",  "copies_done", "needs_part_in_place",
+                                     "timing", "settings"};
   for (const auto& [key, value] : job.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
