@@ -1,0 +1,24 @@
+#pragma once
+#include <cstdint>
+#include <string>
+
+#include "planner/cell_description.h"
+#include "planner/plan_options.h"
+#include "sampling/textured_mesh.h"
+
+/// A cell, an object and settings of planning that nobody thought of, from a seed.
+namespace hilbrush::testing_pipeline {
+
+struct RandomWork {
+  CellDescription cell;
+  TexturedMesh mesh;  ///< standing on z = 0, centred, black; may need repair
+  PlanOptions options;
+  std::uint64_t dot_count = 0;
+  std::string shape;  ///< what kind of mesh
+};
+
+/// Geometry, limits and dynamics of the cell anywhere between plausible and silly; home inside the limits. Same seed,
+/// same work.
+RandomWork random_work(std::uint64_t seed);
+
+}  // namespace hilbrush::testing_pipeline
