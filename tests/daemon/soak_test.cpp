@@ -20,7 +20,7 @@
 #include "tests/daemon/sim_devices.h"
 
 /// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients
-/// that come, talk nonsense and go. HILBRUSH_LONG=1 makes it an hour.
+/// that come, talk nonsense and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N so many seconds.
 namespace hilbrush {
 namespace {
 
@@ -225,8 +225,9 @@ class Soak {
 };
 
 TEST(SoakTest, JobsFaultsAndClientsLeaveNoTraceInMemoryOrDescriptorsAndCountsAreTrue) {
-  const bool is_long = std::getenv("HILBRUSH_LONG") != nullptr;
-  const auto length = is_long ? std::chrono::seconds(3600) : std::chrono::seconds(12);
+  const char* given_s = std::getenv("HILBRUSH_SOAK_S");
+  const int by_default_s = std::getenv("HILBRUSH_LONG") != nullptr ? 3600 : 12;
+  const auto length = std::chrono::seconds(given_s != nullptr ? std::atoi(given_s) : by_default_s);
   const unsigned seed = 31;
   SCOPED_TRACE(seed);
   Soak soak(seed);
