@@ -1,9 +1,10 @@
 // How much better `centroid` and `blue` place dots than the thesis's `jittered`, in the plane and on meshes, against
 // the limits that are set for them.
-//   placement_bench [--count N] [--shapes L] [MESH...]
+//   placement_bench [--count N] [--shapes L] [--seeds S] [MESH...]
 // On a plate (the unit square), on a sphere of 8,000 triangles, and on each mesh, black all over. Lengths are over
 // sqrt(A / N); power is the mean below half the principal frequency. Ratios are to jittered on the same surface with
-// the same test shapes. A hash of all figures is printed at the end.
+// the same test shapes. One set's anisotropy scatters, so its mean over S seeds is given too. A hash of all figures is
+// printed at the end.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -97,6 +98,32 @@ class Bench {
       std::fflush(stdout);
     }
   }
+  /// One set's anisotropy scatters: mean and standard deviation over seeds 1 to `seed_count`, in the plane.
+  void anisotropy_over_seeds(const TexturedMesh& mesh, std::uint64_t seed_count) {
+    const ToneField tone(mesh, {});
+    const SurfaceCurve curve(mesh);
+    std::printf("\nanisotropy in the plane over %llu seeds, mean and standard deviation:",
+                static_cast<unsigned long long>(seed_count));
+    for (const Sampler sampler : {Sampler::kJittered, Sampler::kBlue}) {
+      double sum = 0, square_sum = 0;
+      for (std::uint64_t seed = 1; seed <= seed_count; ++seed) {
+        SampleOptions options;
+        options.dot_count = count_;
+        options.sampler = sampler;
+        options.seed = seed;
+        std::vector<Eigen::Vector2d> points;
+        for (const Dot& dot : place_dots(curve, tone, options).dots) points.emplace_back(dot.position_O.head<2>());
+        const double anisotropy = plane_spectrum(points).anisotropy;
+        hash_.take(anisotropy);
+        sum += anisotropy;
+        square_sum += anisotropy * anisotropy;
+      }
+      const double n = static_cast<double>(seed_count), mean = sum / n;
+      std::printf("  %s %.3f %.3f", sampler_name(sampler), mean, std::sqrt(std::max(0., square_sum / n - mean * mean)));
+      std::fflush(stdout);
+    }
+    std::printf("\n");
+  }
   unsigned long long hash() const { return hash_.value(); }
 
  private:
@@ -143,7 +170,7 @@ class Bench {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::uint64_t count = 50'000, shapes = 2000;
+  std::uint64_t count = 50'000, shapes = 2000, seeds = 10;
   std::vector<std::string> meshes;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
@@ -151,6 +178,8 @@ int main(int argc, char** argv) {
       count = std::strtoull(argv[++i], nullptr, 10);
     else if (argument == "--shapes" && i + 1 < argc)
       shapes = std::strtoull(argv[++i], nullptr, 10);
+    else if (argument == "--seeds" && i + 1 < argc)
+      seeds = std::strtoull(argv[++i], nullptr, 10);
     else
       meshes.push_back(argument);
   }
@@ -161,6 +190,7 @@ int main(int argc, char** argv) {
         ".02, spacing >= .5,\nhole <= 1.0, anisotropy not above jittered's. In the plane `balls` are quarter "
         "circles and `sets` triangles.\n");
     bench.surface("plane", plate(), true);
+    bench.anisotropy_over_seeds(plate(), seeds);
     bench.surface("sphere", sphere(), false);
     for (const std::string& mesh : meshes)
       bench.surface(std::filesystem::path(mesh).stem().string(), black_model(mesh), false);
