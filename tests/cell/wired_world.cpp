@@ -31,7 +31,7 @@ WireOptions WiredWorld::quick(double time_scale, double start_delay_s) {
   return options;
 }
 
-WiredWorld::WiredWorld(const WireOptions& options)
+WiredWorld::WiredWorld(const WireOptions& options, Drivers drivers)
     : wire_(shipped_cell(), options),
       cell_file_(folder_.write("cell.json", wired_cell_text(shipped_text(), wire_.endpoints(), options.time_scale))),
       description(load_cell(cell_file_)) {
@@ -39,7 +39,7 @@ WiredWorld::WiredWorld(const WireOptions& options)
     const std::lock_guard lock(mutex_);
     emissions_.push_back(emission);
   });
-  reconnect();
+  if (drivers == Drivers::kHere) reconnect();
 }
 
 void WiredWorld::reconnect() {

@@ -17,8 +17,10 @@ namespace hilbrush::test {
 
 class WiredWorld {
  public:
+  /// kNone: somebody else drives the devices, by the cell file.
+  enum class Drivers { kHere, kNone };
   /// The shipped cell on wires. @throws what the wire or the drivers throw
-  explicit WiredWorld(const WireOptions& options);
+  explicit WiredWorld(const WireOptions& options, Drivers drivers = Drivers::kHere);
   static WireOptions quick(double time_scale, double start_delay_s = .1);
 
   /// New drivers, as after the daemon's restart; the devices stay as they are.
