@@ -359,8 +359,9 @@ void Run::expose(std::size_t i) {
     prove_laser_off();
     // Whoever cuts a pulse sets the flag before, so a flag that is still clear here means that the pulse was whole.
     end_if_asked();
+    // Whoever gates the light may have failed in the pulse and cut it.
     const auto after = cell_.laser.status();
-    if (!after.interlock_closed) throw DriverError("the interlock was opened during a pulse");
+    check_pulse_conditions(after);
     if (after.state != DeviceState::kReady)
       throw DriverError(std::string("the laser went to state ") + device_state_name(after.state) + " during a pulse" +
                         (after.fault.empty() ? "" : ": " + after.fault));
