@@ -53,6 +53,7 @@ class MapReader {
     map_.home = read_steps(json, "home");
     map_.move = read_steps(json, "move");
     map_.stop = read_steps(json, "stop");
+    map_.resume = read_steps(json, "resume");
     map_.clear_fault = read_steps(json, "clear_fault");
     const auto takes_target = [](const RegisterStep& step) { return step.source == RegisterStep::Source::kTarget; };
     if (std::none_of(map_.move.begin(), map_.move.end(), takes_target))

@@ -99,7 +99,7 @@ struct RegisterMap {
   std::vector<RegisterTest> arrived;           ///< all of them: the drive says that its move is done
   std::vector<RegisterTest> homed;             ///< all of them: has its reference
   std::vector<RegisterStep> enable, disable, home, move, stop, clear_fault;
-  double home_timeout_s = 60;
+  std::vector<RegisterStep> resume;  ///< before the first move after a stop
 };
 
 struct LaserOptions {
@@ -108,7 +108,7 @@ struct LaserOptions {
   double power_min_w = 0, power_max_w = 0;  ///< the cell file's, checked against the device's own
   double arm_timeout_s = 30;                ///< start delay and warm-up
   double heartbeat_s = 0.02;                ///< to its guard
-  int heartbeats_missed = 3;                ///< so many missing in a row disable it
+  int heartbeats_missed = 5;                ///< so many missing in a row disable it
 };
 
 }  // namespace hilbrush

@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <bit>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 
+#include "drivers/line_codec.h"
+
 namespace hilbrush {
 namespace {
+
+using line_codec::trimmed;
 
 static_assert(std::endian::native == std::endian::little, "the feedback packet is little-endian and copied as it is");
 
@@ -38,13 +41,6 @@ bool read_joints(std::string_view bytes, std::size_t offset, DobotJoints& joints
 bool is_frame_start(std::string_view bytes) {
   return value_at<std::uint16_t>(bytes, kLengthAt) == kDobotFrameBytes &&
          value_at<std::uint64_t>(bytes, kTestWordAt) == kTestWord;
-}
-
-std::string_view trimmed(std::string_view text) {
-  const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
-  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
-  return text;
 }
 
 struct Call {
@@ -107,9 +103,7 @@ std::optional<DobotReply> decode_dobot_reply(std::string_view text) {
 bool is_dobot_echo(std::string_view echo, std::string_view command) {
   const auto a = parse_call(echo), b = parse_call(command);
   if (!a || !b || a->commas != b->commas || a->has_parameters != b->has_parameters) return false;
-  return std::equal(a->name.begin(), a->name.end(), b->name.begin(), b->name.end(), [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
-  });
+  return line_codec::equals_ignoring_case(a->name, b->name);
 }
 
 std::string dobot_error_text(long error) {

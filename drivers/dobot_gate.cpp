@@ -20,19 +20,23 @@ void DobotRobot::OutputGate::note_off() {
   known_frame_ = robot_.frame_count_;
 }
 
-void DobotRobot::OutputGate::set_listener(std::function<void()> on_dark) {
+void DobotRobot::OutputGate::set_listener(Listener listener) {
   const std::lock_guard lock(robot_.mutex_);
-  on_dark_ = std::move(on_dark);
+  listener_ = std::move(listener);
 }
 
-void DobotRobot::OutputGate::tell_dark() {
-  std::function<void()> listener;
+void DobotRobot::OutputGate::tell(bool is_dark) {
+  Listener listener;
   {
     const std::lock_guard lock(robot_.mutex_);
-    listener = on_dark_;
+    listener = listener_;
   }
-  if (listener) listener();
+  if (listener) listener(is_dark);
   robot_.clock_.wake();
+}
+
+void DobotRobot::OutputGate::shut() noexcept {
+  if (!off()) tell(false);
 }
 
 bool DobotRobot::OutputGate::agrees_with(const DobotFrame& frame) {
@@ -62,7 +66,7 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
         if (!is_pulsing_) return;
         note_off();
       }
-      tell_dark();
+      tell(true);
     });
   } catch (const DriverError&) {
     off();
@@ -70,7 +74,17 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
   }
 }
 
-/// The queue is emptied first: a pulse that waits in it must not begin after the output was turned off.
+/// The first try may meet a connection that had died unnoticed.
+void DobotRobot::OutputGate::order_off() {
+  const std::string command = encode_dobot("DOExecute", {output_, 0});
+  try {
+    robot_.ports_.dashboard(command, DobotPorts::kUrgentS);
+  } catch (const LinkError&) {
+    robot_.ports_.dashboard(command, DobotPorts::kUrgentS);
+  }
+}
+
+/// Dark first; then the queue is emptied, and what it may have turned on between the two is turned off again.
 bool DobotRobot::OutputGate::off() noexcept {
   try {
     bool was_pulsing = false;
@@ -80,21 +94,23 @@ bool DobotRobot::OutputGate::off() noexcept {
         return true;
       was_pulsing = is_pulsing_;
     }
-    for (int attempt = 0;; ++attempt) {
+    order_off();
+    if (was_pulsing) {
       try {
-        if (was_pulsing) robot_.ports_.dashboard(encode_dobot("ResetRobot"), DobotPorts::kUrgentS);
-        robot_.ports_.dashboard(encode_dobot("DOExecute", {output_, 0}), DobotPorts::kUrgentS);
-        break;
+        robot_.ports_.dashboard(encode_dobot("ResetRobot"), DobotPorts::kUrgentS);
       } catch (const LinkError&) {
-        if (attempt == 1) return false;  // the first try may have met a connection that had died unnoticed
+        throw;
+      } catch (const DriverError&) {
+        // A controller in alarm refuses: its queue is empty.
       }
+      order_off();
+      robot_.ports_.forget_owed();
     }
-    if (was_pulsing) robot_.ports_.forget_owed();
     {
       const std::lock_guard lock(robot_.mutex_);
       note_off();
     }
-    if (was_pulsing) tell_dark();
+    if (was_pulsing) tell(true);
     return true;
   } catch (const std::exception&) {
     return false;

@@ -16,8 +16,10 @@ class DobotRobot::OutputGate final : public Gate {
   void pulse(double pulse_s) override;
   bool off() noexcept override;
   bool is_on() override;
-  void set_listener(std::function<void()> on_dark) override;
+  void set_listener(Listener listener) override;
 
+  /// After a fault of the robot: off, and if that is not confirmed the listener is told. No lock held.
+  void shut() noexcept;
   /// Reader's thread, under the robot's mutex: false if the output is on though nobody ordered it.
   bool agrees_with(const DobotFrame& frame);
   bool is_pulsing() const { return is_pulsing_; }  ///< under the robot's mutex
@@ -26,11 +28,12 @@ class DobotRobot::OutputGate final : public Gate {
 
  private:
   void note_off();
-  void tell_dark();
+  void tell(bool is_dark);
+  void order_off();
 
   DobotRobot& robot_;
   const int output_;
-  std::function<void()> on_dark_;
+  Listener listener_;
   bool is_pulsing_ = false;        ///< ordered and not confirmed over; under the robot's mutex, like the rest
   bool is_known_off_ = false;      ///< confirmed by the controller, and nothing ordered since
   std::uint64_t known_frame_ = 0;  ///< frames that had come by then

@@ -69,7 +69,19 @@ void DobotRobot::fail(const std::string& sentence) {
     const std::lock_guard lock(mutex_);
     if (!set_fault(sentence)) return;
   }
+  shut_gates();
   clock_.wake();
+}
+
+/// After a fault nobody knows whether the controller still carries out what was queued, such as the end of a pulse: the
+/// dashboard may answer all the same.
+void DobotRobot::shut_gates() noexcept {
+  std::vector<OutputGate*> gates;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [output, gate] : gates_) gates.push_back(gate.get());
+  }
+  for (OutputGate* gate : gates) gate->shut();
 }
 
 void DobotRobot::connect() {
@@ -276,8 +288,7 @@ bool DobotRobot::judge_arrival(const DobotFrame& frame) {
 
 /// Reader's thread.
 void DobotRobot::take_frame(const DobotFrame& frame) {
-  bool is_news = false;
-  Gate* lit = nullptr;
+  bool is_news = false, has_failed = false;
   {
     const std::lock_guard lock(mutex_);
     if (frame_count_ > 0 && frame.time_ms == frame_.time_ms) return;  // stale
@@ -292,12 +303,13 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
       is_news = judge_arrival(frame);
     for (const auto& [output, gate] : gates_)
       if (!gate->agrees_with(frame)) {
-        lit = gate.get();
+        has_failed = true;
         gate->forget();
         is_news = set_fault("the robot's output " + std::to_string(output) + " is on though nobody ordered it");
       }
+    has_failed = has_failed || (is_news && state_ == DeviceState::kFault);
   }
-  if (lit != nullptr) lit->off();
+  if (has_failed) shut_gates();
   if (is_news) clock_.wake();
 }
 

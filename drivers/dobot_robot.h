@@ -53,6 +53,7 @@ class DobotRobot final : public Robot {
   bool judge_arrival(const DobotFrame& frame);
   bool is_at_target(const DobotFrame& frame) const;
   void fail(const std::string& sentence);
+  void shut_gates() noexcept;
   bool set_fault(const std::string& sentence);
   void require(DeviceState state, const char* participle);
   [[noreturn]] void refuse(const char* participle) const;

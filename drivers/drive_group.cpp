@@ -12,7 +12,8 @@ namespace hilbrush {
 namespace {
 
 constexpr double kIdlePollS = 0.1;        ///< wall
-constexpr double kReadyPollS = 0.02;      ///< wall: an axis that drifts from its place is seen before the next dot
+constexpr double kReadyPollS = 0.01;      ///< cell: an axis that drifts from its place is seen before the next dot
+constexpr double kReadyPollMinS = 0.001;  ///< wall
 constexpr double kArrivalPollS = 0.0005;  ///< wall, on top of what the exchanges take
 constexpr double kUrgentS = 0.1;          ///< wall: what a stop waits for a handshake to end
 constexpr double kLongestSettleS = 60;
@@ -339,9 +340,11 @@ void DriveGroup<N>::take(const Readings& readings, double begun_s) {
 /// Wall seconds until the next reading. Under the lock.
 template <std::size_t N>
 double DriveGroup<N>::poll_interval_s() const {
-  if (!is_target_current_ || is_in_position_) return state_ == DeviceState::kReady ? kReadyPollS : kIdlePollS;
+  if (state_ != DeviceState::kReady) return kIdlePollS;
+  const double ready_s = std::max(clock_.wall_s(kReadyPollS), kReadyPollMinS);
+  if (!is_target_current_ || is_in_position_) return ready_s;
   const double due_s = rest_s_ >= 0 ? rest_s_ + settle_s_ : arrival_s_ - settle_s_;
-  return std::clamp(clock_.wall_s(due_s - clock_.now_s()), kArrivalPollS, kReadyPollS);
+  return std::clamp(clock_.wall_s(due_s - clock_.now_s()), kArrivalPollS, ready_s);
 }
 
 template <std::size_t N>

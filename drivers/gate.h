@@ -17,8 +17,10 @@ class Gate {
   virtual bool off() noexcept = 0;
   /// On, or a pulse is not yet confirmed over. Cheap, from any thread.
   virtual bool is_on() = 0;
-  /// Called, from any thread, when is_on() has become false. Set once, before the first pulse.
-  virtual void set_listener(std::function<void()> on_dark) = 0;
+  /// Called, from any thread: with true when is_on() has become false, with false when something went wrong and the
+  /// gate could not be confirmed off.
+  using Listener = std::function<void(bool is_dark)>;
+  virtual void set_listener(Listener listener) = 0;
 };
 
 }  // namespace hilbrush

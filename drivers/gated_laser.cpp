@@ -19,7 +19,13 @@ bool is_within(double value, double min, double max) {
 
 GatedLaser::GatedLaser(std::unique_ptr<LaserHead> head, Gate& gate, const Limits& limits, Clock& clock)
     : head_(std::move(head)), gate_(gate), limits_(limits), clock_(clock) {
-  gate_.set_listener([this] { note_dark(); });
+  // A gate that can't be shut leaves only the emission to be turned off.
+  gate_.set_listener([this](bool is_dark) {
+    if (is_dark)
+      note_dark();
+    else
+      head_->disarm();
+  });
   head_->set_listener([this] { note_reading(); });
 }
 

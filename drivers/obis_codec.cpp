@@ -1,28 +1,13 @@
 #include "drivers/obis_codec.h"
 
-#include <algorithm>
-#include <cctype>
 #include <charconv>
-#include <cmath>
 #include <cstdio>
 
+#include "drivers/line_codec.h"
+
 namespace hilbrush::obis {
-namespace {
-
-std::string_view trimmed(std::string_view text) {
-  const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
-  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-bool equals_word(std::string_view text, std::string_view word) {
-  return text.size() == word.size() && std::equal(text.begin(), text.end(), word.begin(), [](char a, char b) {
-           return std::toupper(static_cast<unsigned char>(a)) == b;
-         });
-}
-
-}  // namespace
+using line_codec::equals_ignoring_case;
+using line_codec::trimmed;
 
 std::string encode(std::string_view command) {
   return std::string(command) + "\r\n";
@@ -36,23 +21,14 @@ std::string power_command(double power_w) {
 
 LineKind classify(std::string_view line) {
   line = trimmed(line);
-  if (equals_word(line, "OK")) return LineKind::kOk;
-  return line.size() >= 3 && equals_word(line.substr(0, 3), "ERR") ? LineKind::kError : LineKind::kValue;
-}
-
-std::optional<double> decode_number(std::string_view line) {
-  line = trimmed(line);
-  if (!line.empty() && line.front() == '+') line.remove_prefix(1);
-  double value = 0;
-  const auto [rest, error] = std::from_chars(line.data(), line.data() + line.size(), value);
-  if (error != std::errc() || rest != line.data() + line.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
+  if (equals_ignoring_case(line, "OK")) return LineKind::kOk;
+  return line.size() >= 3 && equals_ignoring_case(line.substr(0, 3), "ERR") ? LineKind::kError : LineKind::kValue;
 }
 
 std::optional<bool> decode_switch(std::string_view line) {
   line = trimmed(line);
-  if (equals_word(line, "ON") || line == "1") return true;
-  if (equals_word(line, "OFF") || line == "0") return false;
+  if (equals_ignoring_case(line, "ON") || line == "1") return true;
+  if (equals_ignoring_case(line, "OFF") || line == "0") return false;
   return std::nullopt;
 }
 

@@ -16,7 +16,6 @@ std::string power_command(double power_w);
 enum class LineKind { kOk, kError, kValue };
 LineKind classify(std::string_view line);
 
-std::optional<double> decode_number(std::string_view line);           ///< finite
 std::optional<bool> decode_switch(std::string_view line);             ///< ON, OFF, 1, 0
 std::optional<std::uint32_t> decode_hex_word(std::string_view line);  ///< "C8001002", with or without 0x
 

@@ -11,7 +11,9 @@
 #include "drivers/dobot_robot.h"
 #include "drivers/drive_group.h"
 #include "drivers/gated_laser.h"
-#include "drivers/obis_head.h"
+#include "drivers/guard_process.h"
+#include "drivers/guarded_head.h"
+#include "drivers/mapped_drive.h"
 #include "drivers/oriental_az.h"
 #include "drivers/steady_clock.h"
 #include "sampling/input_error.h"
@@ -49,14 +51,17 @@ class SimulatedDevices final : public CellDevices {
 
 /// Axes on the same endpoint share one bus.
 template <std::size_t N>
-std::array<std::unique_ptr<AxisDrive>, N> make_drives(const ModbusGroupOptions<N>& options) {
+std::array<std::unique_ptr<AxisDrive>, N> make_drives(const ModbusGroupOptions<N>& options, Clock& clock) {
   std::array<std::shared_ptr<ModbusBus>, N> buses;
   std::array<std::unique_ptr<AxisDrive>, N> drives;
   for (std::size_t i = 0; i < N; ++i) {
     for (std::size_t other = 0; other < i; ++other)
       if (options.axes[other].endpoint == options.axes[i].endpoint) buses[i] = buses[other];
     if (!buses[i]) buses[i] = std::make_shared<ModbusBus>(options.axes[i].endpoint);
-    drives[i] = std::make_unique<OrientalDrive>(buses[i], options.axes[i]);
+    if (const auto* map = std::get_if<RegisterMap>(&options.map))
+      drives[i] = std::make_unique<MappedDrive>(buses[i], options.axes[i], *map, clock);
+    else
+      drives[i] = std::make_unique<OrientalDrive>(buses[i], options.axes[i]);
   }
   return drives;
 }
@@ -90,6 +95,13 @@ CellDescription in_real_time(CellDescription description) {
   return description;
 }
 
+/// Where both the build and the installation put it.
+std::string guard_beside_me() {
+  std::error_code error;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
+  return (error ? std::filesystem::path() : self.parent_path()) / "hilbrush-laserguard";
+}
+
 bool has_simulated(const CellDeviceOptions& options) {
   return options.robot.index() == 0 || options.table.index() == 0 || options.laser.index() == 0;
 }
@@ -107,14 +119,14 @@ class RealDevices final : public CellDevices {
     if (const auto* dobot = std::get_if<DobotOptions>(&options.robot))
       dobot_ = std::make_unique<DobotRobot>(*dobot, clock_);
     if (const auto* axes = std::get_if<ModbusGroupOptions<4>>(&options.robot))
-      robot_axes_ = std::make_unique<DriveGroup<4>>("robot", axes->axes, make_drives(*axes), clock_);
+      robot_axes_ = std::make_unique<DriveGroup<4>>("robot", axes->axes, make_drives(*axes, clock_), clock_);
     if (const auto* axes = std::get_if<ModbusGroupOptions<2>>(&options.table))
-      table_axes_ = std::make_unique<DriveGroup<2>>("table", axes->axes, make_drives(*axes), clock_);
-    const auto& limits = description.laser;
+      table_axes_ = std::make_unique<DriveGroup<2>>("table", axes->axes, make_drives(*axes, clock_), clock_);
     if (const auto* obis = std::get_if<ObisDevice>(&options.laser))
-      laser_ = std::make_unique<GatedLaser>(
-          std::make_unique<ObisHead>(obis->laser, clock_), dobot_->gate(obis->gate.output),
-          Laser::Limits{limits.power_min_w, limits.power_max_w, limits.pulse_min_s, limits.pulse_max_s}, clock_);
+      make_laser(description, {"obis", false, obis->laser, time_scale(description)}, obis->gate);
+    if (const auto* cobolt = std::get_if<CoboltDevice>(&options.laser))
+      make_laser(description, {"cobolt", cobolt->gate.is_lasers_own, cobolt->laser, time_scale(description)},
+                 cobolt->gate);
   }
 
   Cell cell() override {
@@ -139,6 +151,20 @@ class RealDevices final : public CellDevices {
   }
 
  private:
+  /// The laser's link belongs to its guard, which turns it off whatever happens to this process.
+  void make_laser(const CellDescription& description, const GuardArguments& arguments, const GateOptions& gate) {
+    auto process = std::make_shared<GuardProcess>();
+    auto launch = [process, arguments] { return process->start(guard_beside_me(), to_command_line(arguments)); };
+    const GuardedHead::Options options{.heartbeat_s = arguments.laser.heartbeat_s,
+                                       .arm_timeout_s = arguments.laser.arm_timeout_s};
+    auto head = std::make_unique<GuardedHead>(std::move(launch), options, clock_);
+    Gate& opener = gate.is_lasers_own ? head->gate() : dobot_->gate(gate.output);
+    const auto& limits = description.laser;
+    laser_ = std::make_unique<GatedLaser>(
+        std::move(head), opener,
+        Laser::Limits{limits.power_min_w, limits.power_max_w, limits.pulse_min_s, limits.pulse_max_s}, clock_);
+  }
+
   CellLock lock_;
   SteadyClock steady_;
   EmissionKeeper keeper_;

@@ -1,0 +1,100 @@
+// hilbrush-laserguard: owns a laser's link, so that the laser is turned off whatever happens to the process that uses
+// it. See drivers/guard_server.h. Started by hilbrushd, never by hand: its user's channel is descriptor 3.
+
+#include <signal.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <memory>
+#include <string_view>
+
+#include "drivers/cobolt_head.h"
+#include "drivers/guard_process.h"
+#include "drivers/guard_server.h"
+#include "drivers/obis_head.h"
+#include "drivers/steady_clock.h"
+
+namespace {
+
+using namespace hilbrush;
+
+enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kStillOn = 3 };
+
+/// For the last words of a dying process: the raw link, and what turns the laser off.
+std::atomic<const LineLaser*> g_laser{nullptr};
+constexpr std::string_view kLastWords = "\r\nSOUR:AM:STAT OFF\r\n!d\rl0\r";
+
+/// Only what may be called from a signal handler. Both lasers' words are said: what one doesn't know it refuses.
+void say_last_words(int signal) {
+  if (const LineLaser* laser = g_laser.load())
+    if (const int fd = laser->descriptor(); fd >= 0) {
+      [[maybe_unused]] const ssize_t written = ::write(fd, kLastWords.data(), kLastWords.size());
+    }
+  ::signal(signal, SIG_DFL);
+  ::raise(signal);
+}
+
+/// Signals that mean "end" are read from a descriptor; those that mean "broken" say the last words at once.
+int catch_signals() {
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP, SIGXCPU, SIGXFSZ})
+    ::signal(signal, say_last_words);
+  ::signal(SIGPIPE, SIG_IGN);
+  sigset_t set;
+  ::sigemptyset(&set);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGPWR,
+                           SIGIO, SIGSTKFLT, SIGTSTP, SIGTTIN, SIGTTOU})
+    ::sigaddset(&set, signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) ::sigaddset(&set, signal);
+  ::sigprocmask(SIG_BLOCK, &set, nullptr);
+  return ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+int serve(const GuardArguments& arguments, int signals) {
+  SteadyClock clock(arguments.time_scale);
+  std::unique_ptr<LineLaser> head;
+  std::unique_ptr<CoboltGate> gate;
+  if (arguments.driver == "cobolt") {
+    auto cobolt = std::make_unique<CoboltHead>(arguments.laser, !arguments.has_own_gate, clock);
+    if (arguments.has_own_gate) gate = std::make_unique<CoboltGate>(*cobolt, clock);
+    head = std::move(cobolt);
+  } else {
+    head = std::make_unique<ObisHead>(arguments.laser, clock);
+  }
+  g_laser = head.get();
+  int exit_code = kStillOn;
+  {
+    GuardServer server(*head, gate.get(), GuardProcess::kChannel, signals,
+                       {arguments.laser.heartbeat_s, arguments.laser.heartbeats_missed}, clock);
+    const GuardServer::End end = server.run();
+    if (!server.is_disarmed())
+      std::fputs("hilbrush-laserguard: THE LASER DOES NOT CONFIRM THAT IT IS OFF\n", stderr);
+    else
+      exit_code = end == GuardServer::End::kGarbage ? kFailed : kOk;
+  }
+  g_laser = nullptr;
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + (argc > 0 ? 1 : 0), argv + argc);
+  if (words.size() == 1 && words[0] == "--version") {
+    std::puts("hilbrush-laserguard " HILBRUSH_VERSION);
+    return kOk;
+  }
+  try {
+    return serve(from_command_line(words), catch_signals());
+  } catch (const DriverError& error) {
+    std::fprintf(stderr, "hilbrush-laserguard: %s\n", error.what());
+    return kUsage;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "hilbrush-laserguard: %s\n", error.what());
+    return kFailed;
+  }
+}

@@ -1,0 +1,37 @@
+#include "drivers/cobolt_codec.h"
+
+#include <cstdio>
+
+#include "drivers/line_codec.h"
+
+namespace hilbrush::cobolt {
+std::string encode(std::string_view command) {
+  return std::string(command) + "\r";
+}
+
+std::string power_command(double power_w) {
+  char text[64];
+  std::snprintf(text, sizeof text, "LASer:PM:POWer:SETPoint %.3f", power_w * 1e3);
+  return text;
+}
+
+bool is_ok(std::string_view line) {
+  return line_codec::equals_ignoring_case(line_codec::trimmed(line), "OK");
+}
+
+std::string fault_text(long fault) {
+  switch (fault) {
+    case 0:
+      return "";
+    case 1:
+      return "temperature";
+    case 3:
+      return "interlock";
+    case 4:
+      return "current limit";
+    default:
+      return "fault " + std::to_string(fault);
+  }
+}
+
+}  // namespace hilbrush::cobolt
