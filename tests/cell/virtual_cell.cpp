@@ -171,7 +171,8 @@ Robot::Status VirtualRobot::status() {
   if (state_ != DeviceState::kDisconnected && !link_.is_lost()) look();
   fault_if_lost();
   const bool is_on = state_ == DeviceState::kReady || state_ == DeviceState::kEnabled;
-  if (is_on && mode_ != 5 && mode_ != 7) {
+  constexpr int kAlarm = 9;
+  if ((is_on && mode_ != 5 && mode_ != 7) || (state_ == DeviceState::kConnected && mode_ == kAlarm)) {
     state_ = DeviceState::kFault;
     fault_ = "the robot is in alarm";
   }
