@@ -1,6 +1,7 @@
 // hilbrush-laserguard: owns a laser's link, so that the laser is turned off whatever happens to the process that uses
 // it. See drivers/guard_server.h. Started by hilbrushd, never by hand: its user's channel is descriptor 3.
 
+#include <sched.h>
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
@@ -54,6 +55,13 @@ int catch_signals() {
   return ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
+/// Heartbeats and pulses are timed to the millisecond: where the system allows it, before all ordinary processes.
+void take_precedence() {
+  constexpr int kPriority = 10;
+  const sched_param parameters{kPriority};
+  ::sched_setscheduler(0, SCHED_FIFO, &parameters);
+}
+
 int serve(const GuardArguments& arguments, int signals) {
   SteadyClock clock(arguments.time_scale);
   std::unique_ptr<LineLaser> head;
@@ -89,7 +97,9 @@ int main(int argc, char** argv) {
     return kOk;
   }
   try {
-    return serve(from_command_line(words), catch_signals());
+    const GuardArguments arguments = from_command_line(words);
+    take_precedence();
+    return serve(arguments, catch_signals());
   } catch (const DriverError& error) {
     std::fprintf(stderr, "hilbrush-laserguard: %s\n", error.what());
     return kUsage;

@@ -104,13 +104,16 @@ void DobotRobot::connect() {
     for (;;) {
       {
         const std::lock_guard lock(mutex_);
-        if (state_ == DeviceState::kFault) throw DriverError(fault_);
-        if (frame_count_ > 0) return;
+        if (frame_count_ > 0) {
+          if (state_ == DeviceState::kFault) refuse("connected");  // it is, and can be cleared
+          return;
+        }
+        if (state_ == DeviceState::kFault) throw LinkError(fault_);
       }
-      if (clock_.now_s() > deadline_s) throw DriverError("the robot sends no feedback");
+      if (clock_.now_s() > deadline_s) throw LinkError("the robot sends no feedback");
       clock_.sleep_until(clock_.now_s() + kFrameS);
     }
-  } catch (const DriverError&) {
+  } catch (const LinkError&) {
     ports_.close();
     const std::lock_guard lock(mutex_);
     state_ = DeviceState::kDisconnected;
@@ -167,6 +170,16 @@ void DobotRobot::disable() noexcept {
   if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
 }
 
+void DobotRobot::wait_for_alarm_end() {
+  const std::string alarm = std::to_string(static_cast<int>(DobotMode::kError));
+  const double deadline_s = clock_.now_s() + 2;
+  while (ports_.dashboard(encode_dobot("RobotMode")) == alarm) {
+    if (clock_.now_s() > deadline_s)
+      throw DriverError("the robot stays in alarm: " + ports_.dashboard(encode_dobot("GetErrorID")));
+    clock_.sleep_until(clock_.now_s() + kFrameS);
+  }
+}
+
 /// Everything is connected anew: after a fault it is not known what the ports still owe.
 void DobotRobot::clear_fault() {
   require(DeviceState::kFault, "cleared of a fault");
@@ -179,17 +192,8 @@ void DobotRobot::clear_fault() {
     ports_.dashboard(encode_dobot("ResetRobot"));
     ports_.dashboard(encode_dobot("ClearError"));
     ports_.dashboard(encode_dobot("continue"));
+    wait_for_alarm_end();
     connect();
-    const double deadline_s = clock_.now_s() + 1;
-    for (;;) {
-      {
-        const std::lock_guard lock(mutex_);
-        if (state_ == DeviceState::kFault) throw DriverError(fault_);
-        if (frame_.mode != DobotMode::kError && !frame_.has_error) return;
-      }
-      if (clock_.now_s() > deadline_s) throw DriverError("the robot stays in alarm");
-      clock_.sleep_until(clock_.now_s() + kFrameS);
-    }
   } catch (const DriverError& error) {
     const std::lock_guard lock(mutex_);
     state_ = DeviceState::kFault;
@@ -295,7 +299,8 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     ++frame_count_;
     frame_ = frame;
     const bool is_on = state_ == DeviceState::kEnabled || state_ == DeviceState::kReady;
-    if (is_on && (frame.mode == DobotMode::kError || frame.has_error))
+    const bool is_alive = is_on || state_ == DeviceState::kConnected;
+    if (is_alive && (frame.mode == DobotMode::kError || frame.has_error))
       is_news = set_fault("the robot is in alarm");
     else if (is_on && frame.mode != DobotMode::kEnabled && frame.mode != DobotMode::kRunning)
       is_news = set_fault(std::string("the robot is ") + dobot_mode_name(frame.mode));

@@ -25,9 +25,10 @@ LineLaser::LineLaser(const LaserOptions& options, double gap_s, Clock& clock)
     : options_(options), gap_s_(gap_s), clock_(clock) {}
 
 std::string LineLaser::ask(const std::string& command, double wall_s) {
-  const std::unique_lock lock(exchange_mutex_, deadline_in(wall_s));
+  constexpr int kExchangesAhead = 5;  // of others who wait for the link
+  const std::unique_lock lock(exchange_mutex_, deadline_in(wall_s + kExchangesAhead * gap_s_));
   if (!lock) throw LinkError("the laser's link is busy with a command that gets no answer");
-  if (gap_s_ > 0) std::this_thread::sleep_until(next_exchange_);
+  if (gap_s_ > 0 && wall_s > kUrgentS) std::this_thread::sleep_until(next_exchange_);  // darkness does not wait
   const Deadline deadline = deadline_in(wall_s);
   try {
     if (!link_) {
@@ -98,8 +99,8 @@ void LineLaser::check_may_arm(const Condition& condition) {
 
 void LineLaser::check_not_disarmed() {
   const std::lock_guard lock(mutex_);
-  if (is_disarming_) throw DriverError("the laser was turned off again during its start delay");
   if (state_ != DeviceState::kConnected) throw DriverError("the laser cannot be enabled: " + fault_);
+  if (is_disarming_) throw DriverError("the laser was turned off again during its start delay");
 }
 
 void LineLaser::arm() {
@@ -109,33 +110,45 @@ void LineLaser::arm() {
       throw DriverError(std::string("the laser cannot be enabled: it is ") + device_state_name(state_) +
                         (fault_.empty() ? "" : ": " + fault_));
     is_disarming_ = false;
+    is_arming_ = true;
     power_w_.reset();
   }
+  try {
+    bring_up();
+  } catch (const DriverError&) {
+    end_arming();
+    disarm();
+    throw;
+  }
+  end_arming();
+}
+
+void LineLaser::end_arming() {
+  const std::lock_guard lock(mutex_);
+  is_arming_ = false;
+}
+
+void LineLaser::bring_up() {
   check_may_arm(read_condition());
   prepare_arming();
   check_not_disarmed();
-  try {
-    order_emission();
-    const double deadline_s = clock_.now_s() + options_.arm_timeout_s;
-    for (;;) {
-      check_not_disarmed();
-      const double begun_s = clock_.now_s();
-      const Condition condition = read_condition();
-      check_may_arm(condition);
-      if (condition.is_armed) {
-        const std::lock_guard lock(mutex_);
-        if (is_disarming_ || state_ != DeviceState::kConnected) continue;
-        condition_ = condition;
-        read_s_ = begun_s;
-        state_ = DeviceState::kReady;
-        return;
-      }
-      if (begun_s > deadline_s) throw DriverError("the laser does not get ready in time");
-      clock_.sleep_until(begun_s + kArmPollS);
+  order_emission();
+  const double deadline_s = clock_.now_s() + options_.arm_timeout_s;
+  for (;;) {
+    check_not_disarmed();
+    const double begun_s = clock_.now_s();
+    const Condition condition = read_condition();
+    check_may_arm(condition);
+    if (condition.is_armed) {
+      const std::lock_guard lock(mutex_);
+      if (is_disarming_ || state_ != DeviceState::kConnected) continue;
+      condition_ = condition;
+      read_s_ = begun_s;
+      state_ = DeviceState::kReady;
+      return;
     }
-  } catch (const DriverError&) {
-    disarm();
-    throw;
+    if (begun_s > deadline_s) throw DriverError("the laser does not get ready in time");
+    clock_.sleep_until(begun_s + kArmPollS);
   }
 }
 
@@ -278,7 +291,7 @@ void LineLaser::poll() {
     if (!is_polling_) return;
     const bool was_asked = is_look_due_;
     is_look_due_ = false;
-    if (state_ == DeviceState::kFault) continue;
+    if (state_ == DeviceState::kFault || is_arming_) continue;  // whoever arms it reads it himself
     const bool was_closed = condition_.is_interlock_closed;
     lock.unlock();
     try {

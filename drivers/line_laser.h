@@ -71,6 +71,8 @@ class LineLaser : public LaserHead {
   void take(const Condition& condition, double begun_s);
   void check_may_arm(const Condition& condition);
   void check_not_disarmed();
+  void bring_up();
+  void end_arming();
   void set_fault(const std::string& sentence);
 
   const LaserOptions options_;
@@ -91,7 +93,7 @@ class LineLaser : public LaserHead {
   std::string fault_;
   Condition condition_;
   double read_s_ = 0;
-  bool is_polling_ = false, is_look_due_ = false, is_disarming_ = false;
+  bool is_polling_ = false, is_look_due_ = false, is_disarming_ = false, is_arming_ = false;
   Powers powers_;
   std::optional<double> power_w_;  ///< as last read back
   std::thread thread_;

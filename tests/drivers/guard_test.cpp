@@ -33,6 +33,8 @@ WireOptions with_laser(WireOptions::LaserHead head) {
   return options;
 }
 
+constexpr int kBeatsMissed = 15;
+
 /// A user of the guard that speaks its protocol by hand, so that it can break off at any point.
 class GuardTest : public testing::Test {
  protected:
@@ -47,7 +49,9 @@ class GuardTest : public testing::Test {
 
   GuardArguments arguments() const {
     const bool is_cobolt = world->wire.endpoints().laser_driver == "cobolt";
-    return {is_cobolt ? "cobolt" : "obis", is_cobolt, world->laser_options(), world->clock.wall_s(1)};
+    GuardArguments result{is_cobolt ? "cobolt" : "obis", is_cobolt, world->laser_options(), world->clock.wall_s(1)};
+    result.laser.heartbeats_missed = kBeatsMissed;  // more than on a real cell: this machine may be busy
+    return result;
   }
   void hang_up() {
     if (channel >= 0) ::close(channel);
@@ -75,9 +79,14 @@ class GuardTest : public testing::Test {
     }
     return {number, false, "no answer"};
   }
+  /// What the guard says against it, or nothing.
+  std::string refusal_of(guard::Verb verb, double value = 0) {
+    const guard::Reply reply = ask(verb, value);
+    return reply.is_ok ? "" : "refused: " + reply.text;
+  }
   void arm() {
-    ASSERT_TRUE(ask(guard::Verb::kConnect).is_ok);
-    ASSERT_TRUE(ask(guard::Verb::kArm).is_ok);
+    ASSERT_EQ(refusal_of(guard::Verb::kConnect), "");
+    ASSERT_EQ(refusal_of(guard::Verb::kArm), "");
     ASSERT_TRUE(is_emission_ordered());
   }
   bool is_emission_ordered() {
@@ -131,8 +140,8 @@ class GuardTest : public testing::Test {
   guard::StatusMessage status;
 };
 
-constexpr double kAllowanceMs = 20 * 5;  // heartbeats that may be missing
-constexpr double kSlackMs = 400;         // a busy machine
+constexpr double kAllowanceMs = 20 * kBeatsMissed;
+constexpr double kSlackMs = 400;  // a busy machine
 
 TEST_F(GuardTest, DisarmsAndEndsWithItsChannel) {
   start();
@@ -174,7 +183,7 @@ TEST_F(GuardTest, AMissedHeartbeatLatchesUntilItIsCleared) {
   EXPECT_NE(refusal.text.find("heard nothing"), std::string::npos) << refusal.text;
   EXPECT_EQ(status.status.state, DeviceState::kFault);
   EXPECT_FALSE(ask(guard::Verb::kPulse, .005).is_ok);
-  ASSERT_TRUE(ask(guard::Verb::kClear).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kClear), "");
   EXPECT_TRUE(ask(guard::Verb::kArm).is_ok);
   EXPECT_TRUE(is_emission_ordered());
 }
@@ -205,11 +214,11 @@ TEST_F(GuardTest, EveryCatchableSignalDisarms) {
 
 TEST_F(GuardTest, DisarmingDoesNotWaitForArming) {
   start();
-  ASSERT_TRUE(ask(guard::Verb::kConnect).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kConnect), "");
   say(guard::encode(guard::Request{++number, guard::Verb::kArm, 0}));  // waits for the start delay
   const auto begun = Steady::now();
   while (!is_emission_ordered() && Steady::now() < begun + std::chrono::seconds(2)) beat();
-  ASSERT_TRUE(ask(guard::Verb::kDisarm).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kDisarm), "");
   EXPECT_FALSE(is_emission_ordered());
   for (int i = 0; i < 20; ++i) {
     beat();
@@ -220,11 +229,11 @@ TEST_F(GuardTest, DisarmingDoesNotWaitForArming) {
 
 TEST_F(GuardTest, EndsASerialPulseByItselfWhenItsUserIsGone) {
   start(WireOptions::LaserHead::kCobolt);
-  ASSERT_TRUE(ask(guard::Verb::kConnect).is_ok);
-  ASSERT_TRUE(ask(guard::Verb::kArm).is_ok);
-  ASSERT_TRUE(ask(guard::Verb::kPower, .05).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kConnect), "");
+  ASSERT_EQ(refusal_of(guard::Verb::kArm), "");
+  ASSERT_EQ(refusal_of(guard::Verb::kPower, .05), "");
   constexpr double kPulseS = .05;  // cell
-  ASSERT_TRUE(ask(guard::Verb::kPulse, kPulseS).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kPulse, kPulseS), "");
   hang_up();
   EXPECT_LT(milliseconds_until_off(), kSlackMs);
   const auto emissions = world->emissions();
@@ -235,15 +244,15 @@ TEST_F(GuardTest, EndsASerialPulseByItselfWhenItsUserIsGone) {
 
 TEST_F(GuardTest, TimesSerialPulses) {
   start(WireOptions::LaserHead::kCobolt);
-  ASSERT_TRUE(ask(guard::Verb::kConnect).is_ok);
-  ASSERT_TRUE(ask(guard::Verb::kArm).is_ok);
-  ASSERT_TRUE(ask(guard::Verb::kPower, .05).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kConnect), "");
+  ASSERT_EQ(refusal_of(guard::Verb::kArm), "");
+  ASSERT_EQ(refusal_of(guard::Verb::kPower, .05), "");
   for (int i = 0; i < 5; ++i) {
-    ASSERT_TRUE(ask(guard::Verb::kPulse, .03).is_ok);
+    ASSERT_EQ(refusal_of(guard::Verb::kPulse, .03), "");
     do beat();
     while (ask(guard::Verb::kPowers).is_ok && status.is_gate_on);
   }
-  ASSERT_TRUE(ask(guard::Verb::kGateOff).is_ok);
+  ASSERT_EQ(refusal_of(guard::Verb::kGateOff), "");
   const auto emissions = world->emissions();
   ASSERT_EQ(emissions.size(), 5u);
   for (const Emission& emission : emissions) EXPECT_NEAR(emission.length_s, .03, .02);
