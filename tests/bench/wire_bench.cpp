@@ -1,0 +1,189 @@
+// What the wire costs: a program painted through the real drivers against the device servers of sim/wire, beside the
+// same program on the cell in process; whose time a dot takes; and how long a stop takes until the light is off.
+//
+//   wire_bench                                a generated program of 150 dots, 60 of them in real time, 40 stops
+//   wire_bench MODEL SIZE_MM DPI SCALE REAL STOPS
+//
+// paints MODEL at SCALE wall seconds a cell second, then the first REAL dots of it in real time, then measures STOPS.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <thread>
+
+#include "config/cell_file.h"
+#include "daemon/pipeline.h"
+#include "drivers/driver_error.h"
+#include "planner/program_file.h"
+#include "sampling/images/image_file.h"
+#include "sampling/model_file.h"
+#include "sampling/placement.h"
+#include "sim/devices/sim_cell.h"
+#include "sim/film/beam.h"
+#include "sim/film/film.h"
+#include "tests/bench/answer_hash.h"
+#include "tests/cell/wired_world.h"
+#include "tests/support/temporary_folder.h"
+
+namespace {
+
+using namespace hilbrush;
+using test::WiredWorld;
+using Wall = std::chrono::steady_clock;
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0;
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+ExposureProgram planned(const std::string& model, double size_mm, double dpi) {
+  const testing_support::TemporaryFolder folder;
+  JobSettings settings;
+  settings.size_mm = size_mm;
+  settings.dpi = dpi;
+  run_plan({model, settings, find_cell("default"), folder.path()}, {});
+  return read_program(folder.path() / "program.ply");
+}
+
+std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description) {
+  description.simulation.time_scale = 0;
+  SimCell sim(description);
+  std::vector<Emission> emissions;
+  sim.set_emission_sink([&](const Emission& emission) { emissions.push_back(emission); });
+  bring_up(sim.cell());
+  Journal journal = Journal::in_memory(program.exposures.size());
+  ExecutionControl control;
+  execute(program, {}, sim.cell(), description, journal, control);
+  return emissions;
+}
+
+/// Paints on the wire and prints whose time it took.
+std::vector<Emission> painted_on_wire(const ExposureProgram& program, double time_scale) {
+  WiredWorld world(WiredWorld::quick(time_scale));
+  ExecutionControl control;
+  world.recover(control);
+  Journal journal = Journal::in_memory(program.exposures.size());
+  const auto begun = Wall::now();
+  const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
+  const double wall_s = std::chrono::duration<double>(Wall::now() - begun).count();
+  std::vector<double> before, after, both;
+  for (const TimeRecord::Dot& dot : world.wire().dot_times()) {
+    before.push_back(dot.before_s);
+    after.push_back(dot.after_s);
+    both.push_back(dot.before_s + dot.after_s);
+  }
+  std::printf("scale %g: %zu of %zu dots%s%s, %.1f s of the cell, %.1f s wall\n", time_scale, result.exposed,
+              program.exposures.size(), result.reason.empty() ? "" : ": ", result.reason.c_str(), result.elapsed_s,
+              wall_s);
+  std::printf(
+      "  added a dot, ms of the cell: median %.3f, p99 %.3f, worst %.3f (before the light %.3f / %.3f, after it %.3f / "
+      "%.3f)\n",
+      quantile(both, .5) * 1e3, quantile(both, .99) * 1e3, quantile(both, 1) * 1e3, quantile(before, .5) * 1e3,
+      quantile(before, .99) * 1e3, quantile(after, .5) * 1e3, quantile(after, .99) * 1e3);
+  std::printf("  the same by the executor's own watch: median %.3f, p99 %.3f, worst %.3f\n",
+              result.own_time.quantile_s(.5) * 1e3, result.own_time.quantile_s(.99) * 1e3,
+              result.own_time.longest_s() * 1e3);
+  return world.emissions();
+}
+
+void compare(const std::vector<Emission>& in_process, const std::vector<Emission>& on_wire,
+             const CellDescription& description) {
+  double worst_m = 0, worst_power = 0;
+  const std::size_t count = std::min(in_process.size(), on_wire.size());
+  AnswerHash hash;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d a = beam_from_joints(description, in_process[i].joints).focus_O;
+    const Eigen::Vector3d b = beam_from_joints(description, on_wire[i].joints).focus_O;
+    worst_m = std::max(worst_m, (a - b).norm());
+    const double energy_a = in_process[i].power_w * in_process[i].length_s;
+    const double energy_b = on_wire[i].power_w * on_wire[i].length_s;
+    worst_power = std::max(worst_power, std::abs(energy_a - energy_b) / energy_a);
+    hash.take(b.x());
+  }
+  std::printf(
+      "%zu emissions in process, %zu on the wire; focus to focus at most %.3f um; energies differ by at most %.4f %%; "
+      "hash %016llx\n",
+      in_process.size(), on_wire.size(), worst_m * 1e6, worst_power * 100, hash.value());
+}
+
+/// Hits on the object's surface, as the film takes them.
+void compare_films(const std::string& model, double size_mm, const std::vector<Emission>& in_process,
+                   const std::vector<Emission>& on_wire, const CellDescription& description, double pitch_m) {
+  const Model loaded = load_model(model, load_image_file);
+  PlacementOptions placement;
+  placement.size_m = size_mm * 1e-3;
+  const TexturedMesh mesh = place_on_table(loaded, placement);
+  Film one(mesh, description, pitch_m), other(mesh, description, pitch_m);
+  const auto hits = one.expose(in_process), others = other.expose(on_wire);
+  std::vector<double> away;
+  std::size_t missed = 0;
+  for (std::size_t i = 0; i < std::min(hits.size(), others.size()); ++i) {
+    if (hits[i].is_hit != others[i].is_hit) ++missed;
+    if (hits[i].is_hit && others[i].is_hit) away.push_back((hits[i].position_O - others[i].position_O).norm() * 1e6);
+  }
+  std::printf("hits on the surface: %zu compared, apart by median %.3f, p99 %.3f, at most %.3f um; %zu hit only once\n",
+              away.size(), quantile(away, .5), quantile(away, .99), quantile(away, 1), missed);
+}
+
+/// In real time: long pulses, each stopped at a random moment.
+void measure_stops(int stops) {
+  WiredWorld world(WiredWorld::quick(1, .01));
+  std::mt19937 random(1);
+  std::vector<double> latencies;
+  int lost = 0;
+  for (int i = 0; i < stops; ++i) {
+    ExecutionControl control;
+    world.recover(control, 20);
+    const Cell cell = world.cell();
+    const auto positions = cell.robot.status().positions;
+    cell.robot.move_to(positions, 0);
+    while (!cell.robot.status().in_position) cell.clock.sleep_until(cell.clock.now_s() + .002);
+    try {
+      cell.laser.fire(.01, .05);
+    } catch (const DriverError&) {  // on a busy machine its guard may have turned it off
+      ++lost;
+      continue;
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(5000 + random() % 35'000));
+    const double asked_s = world.wire().now_s();
+    const bool is_confirmed = request_stop(cell, control);
+    const auto emissions = world.emissions();
+    if (!is_confirmed || emissions.empty()) {
+      ++lost;
+      continue;
+    }
+    latencies.push_back(emissions.back().start_s + emissions.back().length_s - asked_s);
+  }
+  std::printf(
+      "stops: %zu measured, %d without light or word; from the call to the light's end: median %.3f ms, p99 %.3f ms, "
+      "worst %.3f ms\n",
+      latencies.size(), lost, quantile(latencies, .5) * 1e3, quantile(latencies, .99) * 1e3,
+      quantile(latencies, 1) * 1e3);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  const bool has_model = argc > 6;
+  const double time_scale = has_model ? std::atof(argv[4]) : .05;
+  const std::size_t real_dots = has_model ? static_cast<std::size_t>(std::atoi(argv[5])) : 60;
+  const int stops = has_model ? std::atoi(argv[6]) : 40;
+  const CellDescription description = test::shipped_cell();
+  ExposureProgram program =
+      has_model ? planned(argv[1], std::atof(argv[2]), std::atof(argv[3])) : test::small_job(description, 150);
+  const auto in_process = painted_in_process(program, description);
+  const auto on_wire = painted_on_wire(program, time_scale);
+  compare(in_process, on_wire, description);
+  if (has_model) compare_films(argv[1], std::atof(argv[2]), in_process, on_wire, description, program.pitch_m);
+  program.exposures.resize(std::min(program.exposures.size(), real_dots));
+  std::erase_if(program.vias, [&](const Via& via) { return via.before_exposure >= program.exposures.size(); });
+  painted_on_wire(program, 1);
+  measure_stops(stops);
+  return 0;
+}
