@@ -77,6 +77,7 @@ Shortfall Clearance::Slack::shortfall(Obstruction by_object, Obstruction by_tabl
 
 double Clearance::table_distance_m(const Eigen::Vector3d& p_O) const {
   const double r = p_O.head<2>().norm(), z = p_O.z(), post = cell_.fixture.post_height_m;
+  if (z >= distance_.range_m()) return z;  // nobody asks how much farther it is
   return std::min(cylinder_distance_m(r, z, cell_.fixture.post_radius_m, -post, 0),
                   cylinder_distance_m(r, z, cell_.table.plate_radius_m, -post - cell_.table.plate_thickness_m, -post));
 }
@@ -94,6 +95,7 @@ Obstruction Clearance::beam_obstruction(const Eigen::Vector3d& focus_O, const Ei
 /// only has to get away from it.
 double Clearance::table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
   const double far_m = cell_.lens.far_m;
+  if (std::min(focus_O.z(), focus_O.z() - far_m * beam_O.z()) > kBeamTableGapM) return far_m;  // all of it is above
   double free_m = table_distance_m(focus_O);
   const double gap_m = std::min(kBeamTableGapM, .9 * free_m);
   for (double t = 0; t < far_m; t += free_m) {
@@ -112,8 +114,12 @@ Clearance::BallRow Clearance::cover(const Eigen::Vector3d& from_O, const Eigen::
                                     double radius_m, double half_step_m) {
   const int count = std::max(1, static_cast<int>(std::ceil(length_m / (2 * half_step_m))));
   const double slice_m = length_m / count;
-  return {from_O + .5 * slice_m * along_O,    slice_m * along_O, count,
-          std::sqrt(radius_m * radius_m + .25 * slice_m * slice_m), slice_m,           radius_m};
+  return {from_O + .5 * slice_m * along_O,
+          slice_m * along_O,
+          count,
+          std::sqrt(radius_m * radius_m + .25 * slice_m * slice_m),
+          slice_m,
+          radius_m};
 }
 
 Clearance::BallRow Clearance::lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,

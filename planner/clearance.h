@@ -97,7 +97,8 @@ class Clearance {
   Slack links_slack(const TablePose& table, const Joints& joints) const;
   double link_lens_gap_m(const Joints& joints) const;
   double table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
-  /// To the plate and the post, in O; exact outside, not above zero inside.
+  /// To the plate and the post, in O; exact outside up to the field's range and never more than it is, not above zero
+  /// inside.
   double table_distance_m(const Eigen::Vector3d& p_O) const;
 
   const CellDescription& cell_;

@@ -126,7 +126,8 @@ std::optional<Joints> Transit::backed_off(const Joints& joints, double distance_
     Joints back = joints;
     if (!kinematics.solve_arm(focus_W - back_m * beam_W, yaw, elbow_of(joints), back)) continue;
     back[kJ4] = kinematics.wind(kJ4, back[kJ4], joints[kJ4]);
-    if (kinematics.limit_excess(back).is_inside()) return back;
+    // Near J4's limit the same direction may only be found a turn away.
+    if (kinematics.limit_excess(back).is_inside() && !needs_retract(joints, back)) return back;
   }
   return std::nullopt;
 }
