@@ -1,8 +1,13 @@
 #include "daemon/server/cell_thread.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <stdexcept>
 
@@ -34,10 +39,14 @@ std::string file_sha256(const std::filesystem::path& file) {
   return hash.hex_digest();
 }
 
-/// The files of the first copy bear no number.
-std::filesystem::path copy_file(const PaintOrder& order, const char* stem, const char* extension) {
-  const std::string number = order.copy > 1 ? "-" + std::to_string(order.copy) : "";
-  return order.folder / (stem + number + extension);
+/// What the job needs to go on after a power cut - program, model, its row in the store - is durable before its first
+/// dot.
+void sync_file_system(const std::filesystem::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool is_synced = fd >= 0 && ::syncfs(fd) == 0;
+  const int error = errno;
+  if (fd >= 0) ::close(fd);
+  if (!is_synced) throw std::runtime_error(folder.string() + ": can't be synced to disk: " + std::strerror(error));
 }
 
 void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
@@ -54,6 +63,11 @@ void check_provenance(const Provenance& found, const PaintOrder& order, const Ce
 }
 
 }  // namespace
+
+std::filesystem::path copy_file(const PaintOrder& order, const char* stem, const char* extension) {
+  const std::string number = order.copy > 1 ? "-" + std::to_string(order.copy) : "";
+  return order.folder / (stem + number + extension);
+}
 
 CellThread::CellThread(CellDevices& devices, const CellDescription& description, Post post)
     : devices_(devices), cell_(devices.cell()), description_(description), post_(std::move(post)) {
@@ -271,6 +285,7 @@ CellThread::Loaded CellThread::load(const PaintOrder& order) const {
     throw std::runtime_error(journal_file.string() +
                              ": the journal is missing, so nobody knows what was exposed: this part can't be finished; "
                              "cancel the job and submit it again for a new part");
+  if (is_new) sync_file_system(order.folder);
   Journal journal =
       is_new ? Journal::create(journal_file, program.exposures.size(), sha256) : Journal::open(journal_file, sha256);
   if (journal.exposure_count() != program.exposures.size()) throw JobFilesFault("the journal does not fit the program");

@@ -32,6 +32,9 @@ struct PaintOrder {
   bool exposes_in_doubt = false;    ///< the operator orders the dots in doubt again
 };
 
+/// A file of the order's copy: the first copy's bear no number.
+std::filesystem::path copy_file(const PaintOrder& order, const char* stem, const char* extension);
+
 /// How far a job is, by its journal.
 struct PaintTally {
   std::size_t exposed = 0;

@@ -154,6 +154,9 @@ std::string JobBook::restore() {
       job.state = JobState::kPaused;
       job.error = JobError{"", "the daemon ended while this job was painted"};
     }
+    // The journal on the disk is newer than what a power cut has left in the store.
+    if (!job.dry_run && fs::exists(copy_file(paint_order(job), "journal", ""))) job.is_begun = true;
+    if (job.is_begun && job.state == JobState::kReady) job.state = JobState::kPaused;
     const bool has_journal = job.is_begun && !job.dry_run;
     if (has_journal && (job.state == JobState::kPaused || job.state == JobState::kDone)) to_inspect_.push_back(job.id);
     Job& kept = jobs_.emplace(job.id, std::move(job)).first->second;

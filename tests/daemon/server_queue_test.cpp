@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
 
 #include "config/rpc_errors.h"
 #include "daemon/server/job_store.h"
@@ -145,6 +147,40 @@ TEST(ServerQueueTest, AMissingJournalIsNeverMadeAnew) {
   EXPECT_EQ(job.at("state"), "paused");
   EXPECT_NE(job.at("error").at("message").get<std::string>().find("the journal is missing"), std::string::npos);
   EXPECT_EQ(read_emission_record(world.job_folder(id) / "emissions.ply").size(), before);
+}
+
+/// As a power cut may leave it: the store is behind, the journal is not.
+TEST(ServerQueueTest, TheJournalIsBelievedWhereTheStoreIsBehind) {
+  DaemonWorld world;
+  world.options.time_scale = .02;
+  world.begin();
+  std::string id;
+  {
+    LineClient client(world.options.socket);
+    id = world.submit(client, world.model("cup.wrl", 500), "ready");
+    world.clear_and_arm(client);
+    client.result("job.start", placed(id));
+    while (job_of(client, id).at("dots").at("exposed").get<int>() < 60) std::this_thread::yield();
+  }
+  world.end();
+  execute_sql(world.options.state / "jobs.sqlite", "UPDATE job SET state = 'ready', is_begun = 0, exposed = 0");
+  world.begin();
+  LineClient client(world.options.socket);
+  const Json job = world.wait_for(client, id, "paused");
+  EXPECT_TRUE(job.at("needs_part_in_place").get<bool>());
+  const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
+  while (job_of(client, id).at("dots").at("exposed").get<int>() < 60 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::yield();
+  EXPECT_EQ(client.error_code("job.start", placed(id)), kRpcWrongState);
+  world.clear_and_arm(client);
+  client.result("job.resume", placed(id));
+  world.wait_for(client, id, "done");
+  std::map<std::string, int> counts;
+  for (const auto& emission : read_emission_record(world.job_folder(id) / "emissions.ply")) {
+    std::string key;
+    for (const double value : emission.joints) key += std::to_string(std::llround(value * 1e10)) + " ";
+    EXPECT_EQ(++counts[key], 1);
+  }
 }
 
 TEST(ServerQueueTest, AProgramOfAnotherVersionRefusesToRun) {
