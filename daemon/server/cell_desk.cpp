@@ -51,6 +51,7 @@ void CellDesk::stop(const std::string& reason, Reply reply) {
   reason_ = reason;
   job_.clear();
   ++stops_;
+  if (!reply.result && on_own_stop) on_own_stop(reason);
   thread_.stop([this, reply = std::move(reply)](bool is_laser_off) {
     is_laser_proved_off_ = is_laser_off;
     if (reply.result) reply.result(status());

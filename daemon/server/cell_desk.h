@@ -42,6 +42,8 @@ class CellDesk {
 
   /// Called after every stop; set once.
   std::function<void()> on_stop;
+  /// Called after a stop that nobody asked for over the socket, with its reason; set once.
+  std::function<void(const std::string& reason)> on_own_stop;
   /// Devices are looked at while nothing runs that would: one that fails at rest stops the cell, and so does an
   /// interlock that is opened while the laser is armed. To be called several times a second.
   void look_at_devices();

@@ -114,6 +114,13 @@ struct Daemon::Implementation {
         desk(thread, *devices, description),
         book({made_folder(state / "jobs"), cell_file}, store, desk, thread, children, description, post),
         methods(book, desk, audit, [this] { return info(); }) {
+    desk.on_own_stop = [this](const std::string& reason) {
+      Peer self;
+      self.uid = ::geteuid();
+      self.pid = ::getpid();
+      self.user = "hilbrushd";
+      audit.record(self, "cell.stop", Json::object(), reason);
+    };
     book.on_change = [this](const Job& job) { server.notify(job); };
     if (const std::string found = book.restore(); !found.empty()) notice += (notice.empty() ? "" : "; ") + found;
     server.listen(options.socket, {methods, book, access});

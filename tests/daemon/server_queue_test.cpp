@@ -388,6 +388,9 @@ TEST_F(ServerDevicesTest, ADeviceThatFailsAtRestStopsTheCellAndIsBroughtBackByCl
   devices->sim.fail_robot("the link was lost");
   const Json cell = wait_for_state("stopped");
   EXPECT_NE(cell.at("reason").get<std::string>().find("the link was lost"), std::string::npos);
+  std::ifstream in(world.options.state / "audit.log");
+  const std::string log((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  EXPECT_NE(log.find("\"user\":\"hilbrushd\""), std::string::npos) << "a stop of its own is recorded, too";
   world.clear_and_arm(*client);
   EXPECT_EQ(client->result("cell.status").at("cell").at("devices").at("robot").at("state"), "ready");
 }
