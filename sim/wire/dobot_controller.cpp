@@ -211,6 +211,7 @@ std::string DobotController::accept(Item item) {
 }
 
 std::string DobotController::reset() {
+  if (!is_queue_done()) ++dropped_;
   queue_.clear();
   current_.reset();
   is_jogging_ = false;

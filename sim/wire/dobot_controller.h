@@ -47,6 +47,8 @@ class DobotController {
   /// How many items have been put into the queue, and how many are done or dropped: for Sync.
   std::uint64_t accepted_count() const { return accepted_; }
   std::uint64_t ended_count() const { return accepted_ - queue_.size() - (current_ ? 1 : 0); }
+  /// How often the queue was dropped with something in it: a Sync that waits for that fails.
+  std::uint64_t dropped_count() const { return dropped_; }
   int mode() const;
   void raise_alarm(int id);
   /// The frame of the present.
@@ -96,7 +98,7 @@ class DobotController {
   std::deque<Item> queue_;
   std::optional<Item> current_;
   double current_end_s_ = 0;  ///< of a wait
-  std::uint64_t accepted_ = 0;
+  std::uint64_t accepted_ = 0, dropped_ = 0;
   std::optional<State> stale_;
   State last_;
 };
@@ -117,8 +119,8 @@ class DobotTextSession final : public WireSession {
 
  private:
   struct Sync {
-    std::uint64_t until;
-    std::string answer;
+    std::uint64_t until, dropped;
+    std::string command;
   };
   const Port port_;
   DobotController& controller_;

@@ -62,7 +62,7 @@ std::string DobotTextSession::answer(std::string_view message) {
   const std::string name = lower_case(trimmed(command.substr(0, open)));
   const auto arguments = split_arguments(std::string_view(command).substr(open + 1, command.size() - open - 2));
   if (port_ == Port::kMotion && (name == "sync" || name == "syncall")) {
-    syncs_.push_back({controller_.accepted_count(), "0,{}," + command + ";"});
+    syncs_.push_back({controller_.accepted_count(), controller_.dropped_count(), command});
     run();
     return {};
   }
@@ -73,7 +73,8 @@ std::string DobotTextSession::answer(std::string_view message) {
 
 void DobotTextSession::run() {
   while (!syncs_.empty() && controller_.ended_count() >= syncs_.front().until) {
-    send(syncs_.front().answer);
+    const bool is_done = controller_.dropped_count() == syncs_.front().dropped;
+    send((is_done ? "0,{}," : "-1,{},") + syncs_.front().command + ";");
     syncs_.pop_front();
   }
 }

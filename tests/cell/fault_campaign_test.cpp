@@ -175,11 +175,12 @@ bool Case::recover() {
       if (cell.robot.status().state == DeviceState::kFault) cell.robot.clear_fault();
       if (cell.table.status().state == DeviceState::kFault) cell.table.clear_fault();
       bring_up(cell);
-      return true;
+      // A pulse whose end the laser has not confirmed yet is not over.
+      if (cell.laser.status().state == DeviceState::kReady) return true;
     } catch (const DriverError& error) {
       story_ += attempt < 5 ? std::string("recovering: ") + error.what() + "\n" : "";
-      cell.clock.sleep_until(cell.clock.now_s() + .1);
     }
+    cell.clock.sleep_until(cell.clock.now_s() + .1);
   }
   return false;
 }

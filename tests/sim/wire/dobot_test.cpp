@@ -129,9 +129,10 @@ TEST_F(DobotTest, ClearingTheQueueLeavesOutputsAsTheyAre) {
 }
 
 TEST_F(DobotTest, ResetStopsShort) {
-  move("JointMovJ(-40,20,150,5)JointMovJ(40,20,150,5)");
+  move("JointMovJ(-40,20,150,5)JointMovJ(40,20,150,5)Sync()");
   world.pass(.05);
   board("ResetRobot()");
+  EXPECT_EQ(world.hear(*motion), "-1,{},Sync();") << "what it waited for was dropped";
   world.pass(2);
   EXPECT_EQ(board("RobotMode()"), "0,{5},RobotMode();");
   EXPECT_GT(world.devices.cell().position(kJ1), 0);
