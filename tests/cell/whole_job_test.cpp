@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "sim/film/beam.h"
 #include "tests/cell/wired_world.h"
@@ -30,6 +31,23 @@ TEST(WholeJobTest, ASmallProgramThroughTheRealDrivers) {
     const auto wanted = beam_from_joints(world.description, program.exposures[i].joints).focus_O;
     EXPECT_LT((real - wanted).norm(), 10e-6) << "exposure " << i;
   }
+}
+
+/// Modbus RTU and SCPI on pseudo-terminals, through libmodbus and libserialport as on a real line. That library must be
+/// made to take a pseudo-terminal for a serial port: see tests/support/preload, loaded in front of this program.
+TEST(WholeJobTest, OverSerialLines) {
+  if (std::getenv("HILBRUSH_SERIAL_PRELOADED") == nullptr)
+    GTEST_SKIP() << "needs LD_PRELOAD=libserial_over_pty.so and HILBRUSH_SERIAL_PRELOADED=1";
+  WireOptions options = WiredWorld::quick(.1);
+  options.is_table_serial = options.is_laser_serial = true;
+  WiredWorld world(options);
+  const ExposureProgram program = small_job(world.description, 40, 3, 8);
+  ExecutionControl control;
+  world.recover(control);
+  Journal journal = Journal::in_memory(program.exposures.size());
+  const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
+  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
 }
 
 }  // namespace
