@@ -73,14 +73,31 @@ class KillCampaign : public testing::Test {
     }
     throw std::runtime_error("hilbrushd does not come up");
   }
-  std::size_t done(LineClient& client) {
-    const Json dots = client.result("job.get", {{"id", id_}}).at("job").at("dots");
-    return dots.at("exposed").get<std::size_t>();
+  Json job(LineClient& client) { return client.result("job.get", {{"id", id_}}).at("job"); }
+  /// What an operator does until the job is being painted, or done. On a busy machine the laser's guard may have turned
+  /// it off meanwhile: then all three acts are made again.
+  void start(LineClient& client) {
+    constexpr int kAttempts = 200;
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      const bool is_ready = client.error_code("cell.clear") == 0 && client.error_code("cell.arm") == 0;
+      const bool is_first = job(client).at("state") == "ready";
+      if (is_ready) client.error_code(is_first ? "job.start" : "job.resume", {{"id", id_}, {"part_in_place", true}});
+      for (;;) {
+        const Json now = job(client);
+        if (now.at("state") == "done" || (now.at("state") == "painting" && now.at("stage") == "paint")) return;
+        if (now.at("state") == "failed") throw std::runtime_error("the job failed: " + now.dump());
+        if (now.at("state") == "paused" || now.at("state") == "ready") break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    throw std::runtime_error("the job cannot be begun");
   }
-  void start(LineClient& client, bool is_first) {
-    daemons_.clear_and_arm(client);
-    client.result(is_first ? "job.start" : "job.resume", {{"id", id_}, {"part_in_place", true}});
-    while (client.result("job.get", {{"id", id_}}).at("job").at("stage") != "paint") std::this_thread::yield();
+  void finish(LineClient& client) {
+    while (job(client).at("state") != "done") {
+      start(client);
+      while (job(client).at("state") == "painting") std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
   }
 
   const double time_scale_ = is_long() ? 1 : .05;
@@ -104,29 +121,31 @@ TEST_F(KillCampaign, NoDotTwiceNoneLostAtMostOneInDoubtEach) {
     id_ = daemons_.submit(*client, daemons_.model("cup.wrl", dots_), "ready");
   }
   const double kill_after_max_s = is_long() ? 1 : .06;
-  std::size_t last_done = 0;
+  std::size_t last_done = 0, doubts = 0;
   int kills = 0;
   for (; kills < kills_; ++kills) {
     KilledDaemon daemon(daemons_.options);
     const auto client = connect();
-    const Json job = client->result("job.get", {{"id", id_}}).at("job");
-    if (job.at("state") == "done") break;
-    ASSERT_EQ(job.at("state"), kills == 0 ? "ready" : "paused");
-    ASSERT_LE(job.at("dots").at("in_doubt").get<int>(), kills) << "at most one in doubt each";
-    ASSERT_GE(done(*client), last_done);
-    last_done = done(*client);
-    start(*client, kills == 0);
+    const Json before = job(*client);
+    if (before.at("state") == "done") break;
+    ASSERT_EQ(before.at("state"), kills == 0 ? "ready" : "paused");
+    const auto in_doubt = before.at("dots").at("in_doubt").get<std::size_t>();
+    ASSERT_LE(in_doubt, doubts + 1) << "a kill leaves at most one in doubt";
+    ASSERT_GE(before.at("dots").at("exposed").get<std::size_t>(), last_done);
+    last_done = before.at("dots").at("exposed").get<std::size_t>();
+    start(*client);
+    // What a stop by the guard left in doubt is not the kill's.
+    doubts = job(*client).at("dots").at("in_doubt").get<std::size_t>();
     std::this_thread::sleep_for(std::chrono::duration<double>(kill_after_max_s * (random() % 1000) / 1000.));
     daemon.kill();
   }
   EXPECT_GT(last_done, 0u);
   KilledDaemon daemon(daemons_.options);
   const auto client = connect();
-  if (client->result("job.get", {{"id", id_}}).at("job").at("state") != "done") start(*client, false);
-  const Json job = daemons_.wait_for(*client, id_, "done");
-  const auto in_doubt = job.at("in_doubt").get<std::set<std::size_t>>();
-  EXPECT_LE(in_doubt.size(), static_cast<std::size_t>(kills));
-  EXPECT_EQ(job.at("dots").at("exposed").get<std::size_t>() + in_doubt.size(), dots_);
+  finish(*client);
+  const Json after = job(*client);
+  const auto in_doubt = after.at("in_doubt").get<std::set<std::size_t>>();
+  EXPECT_EQ(after.at("dots").at("exposed").get<std::size_t>() + in_doubt.size(), dots_);
 
   const ExposureProgram program = read_program(daemons_.job_folder(id_) / "program.ply");
   const auto testimony = test::hear_witness(program, world_.emissions());
