@@ -337,6 +337,7 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
   PlannedWork work;
   work.plan.program = read_own_program(piece, program_file);
   const DotCounts planned = dot_counts_from_report(program_file.parent_path() / "report.json");
+  piece.report.skipped = skipped_figures_from_report(program_file.parent_path() / "report.json");
   const auto emissions = read_emission_record(emissions_file);
 
   // Sampling is deterministic: the dots are made again rather than read, so that the mesh's report is whole too.

@@ -205,21 +205,53 @@ std::string report_to_json(const Report& report) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-DotCounts dot_counts_from_report(const std::filesystem::path& report_file) {
+namespace {
+
+template <class Read>
+auto read_report(const std::filesystem::path& report_file, const Read& read) {
   std::ifstream in(report_file);
   if (!in)
     throw InputError(report_file.string(),
                      "can't be read; `develop` needs the report that `plan` wrote beside the program");
   try {
-    const Json dots = Json::parse(in).at("dots");
+    return read(Json::parse(in));
+  } catch (const Json::exception& error) {
+    throw InputError(report_file.string(), std::string("is no report of this program: ") + error.what());
+  }
+}
+
+}  // namespace
+
+std::vector<SkippedFigures> skipped_figures_from_report(const std::filesystem::path& report_file) {
+  return read_report(report_file, [](const Json& report) {
+    std::vector<SkippedFigures> all;
+    for (const Json& entry : report.value("skipped", Json::array())) {
+      SkippedFigures figures;
+      figures.reason = entry.at("reason").get<std::string>();
+      figures.what = entry.at("what").get<std::string>();
+      figures.count = entry.at("count").get<std::uint64_t>();
+      figures.text = entry.at("text").get<std::string>();
+      for (const char* unit : {"mm", "deg"})
+        if (entry.contains(std::string("typical_") + unit)) {
+          figures.unit = unit;
+          figures.typical = entry.at("typical_" + figures.unit).get<double>();
+          figures.worst = entry.at("worst_" + figures.unit).get<double>();
+        }
+      all.push_back(std::move(figures));
+    }
+    return all;
+  });
+}
+
+DotCounts dot_counts_from_report(const std::filesystem::path& report_file) {
+  return read_report(report_file, [](const Json& report) {
+    const Json& dots = report.at("dots");
     DotCounts counts;
     counts.requested = dots.at("requested").get<std::uint64_t>();
     counts.placed = dots.at("placed").get<std::uint64_t>();
     for (const auto& [reason, count] : dots.at("skipped").items()) counts.skipped[reason] = count.get<std::uint64_t>();
     return counts;
-  } catch (const Json::exception& error) {
-    throw InputError(report_file.string(), std::string("is no report of this program: ") + error.what());
-  }
+  });
 }
 
 void write_text_file(const std::filesystem::path& file, const std::string& text) {

@@ -67,6 +67,10 @@ std::string report_to_json(const Report& report);
 /// @throws InputError naming the file.
 DotCounts dot_counts_from_report(const std::filesystem::path& report_file);
 
+/// Why dots were skipped, read back from the same report; empty where it does not say.
+/// @throws InputError naming the file.
+std::vector<SkippedFigures> skipped_figures_from_report(const std::filesystem::path& report_file);
+
 /// Replaces `file` in one step, so that it is whole or absent. @throws InputError naming the file.
 void write_text_file(const std::filesystem::path& file, const std::string& text);
 
