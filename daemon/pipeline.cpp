@@ -212,6 +212,7 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   report.advice = advise_mounting(piece.mesh, piece.cell, {mounting_options(piece.settings), piece.up},
                                   plan_options(piece.settings), work.dots, work.plan.skipped, piece.settings.seed);
   report.incidence = incidence_figures(work.plan.program);
+  report.motion = motion_figures(work.plan.program);
   report.time = work.plan.time;
 
   write_program(work.plan.program, output / "program.ply");
@@ -345,6 +346,7 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
   piece.report.dots = planned;
   piece.report.pitch_m = work.plan.program.pitch_m;
   piece.report.incidence = incidence_figures(work.plan.program);
+  piece.report.motion = motion_figures(work.plan.program);
   piece.report.time = estimate_time(piece.cell, work.plan.program);
   piece.report.files = {"report.json"};
   const Reach reach(piece.mesh, piece.cell, plan_options(piece.settings));

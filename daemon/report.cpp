@@ -152,6 +152,20 @@ IncidenceFigures incidence_figures(const ExposureProgram& program) {
           incidences.back() * kDegrees};
 }
 
+MotionFigures motion_figures(const ExposureProgram& program) {
+  MotionFigures figures;
+  const auto& exposures = program.exposures;
+  if (!exposures.empty()) figures.table_poses = 1;
+  for (std::size_t i = 1; i < exposures.size(); ++i) {
+    const Joints &from = exposures[i - 1].joints, &to = exposures[i].joints;
+    figures.path_mm += 1e3 * (exposures[i].position_O - exposures[i - 1].position_O).norm();
+    if (from[kTilt] != to[kTilt] || from[kRotation] != to[kRotation]) ++figures.table_poses;
+    if ((from[kJ2] >= 0) != (to[kJ2] >= 0)) ++figures.elbow_flips;
+    if (!program.vias_before(i).empty()) ++figures.retracts;
+  }
+  return figures;
+}
+
 std::string report_to_json(const Report& report) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -170,6 +184,10 @@ std::string report_to_json(const Report& report) {
                     {"expose", figure(report.time.expose_s)},
                     {"retract", figure(report.time.retract_s)},
                     {"total", figure(report.time.total_s())}};
+  json["motion"] = {{"table_poses", report.motion.table_poses},
+                    {"retracts", report.motion.retracts},
+                    {"elbow_flips", report.motion.elbow_flips},
+                    {"path_mm", figure(report.motion.path_mm)}};
   const SampleReport& path = report.picture.path;
   json["path"] = {{"length_mm", figure(path.path_length_m * 1e3)},
                   {"constant", figure(path.path_constant)},

@@ -29,6 +29,15 @@ struct IncidenceFigures {
 };
 IncidenceFigures incidence_figures(const ExposureProgram& program);
 
+/// How the program moves from exposure to exposure.
+struct MotionFigures {
+  std::uint64_t table_poses = 0;  ///< in which the table stands while dots are exposed, each time counted
+  std::uint64_t retracts = 0;     ///< moves led around by way-points, between the first exposure and the last
+  std::uint64_t elbow_flips = 0;
+  double path_mm = 0;  ///< on the object, in the order of exposure
+};
+MotionFigures motion_figures(const ExposureProgram& program);
+
 /// Where the beam landed against where planning wanted it.
 struct HitFigures {
   double max_error_um = 0;
@@ -50,6 +59,7 @@ struct Report {
   std::optional<MountingAdvice> advice;
   double pitch_m = 0;
   IncidenceFigures incidence;
+  MotionFigures motion;
   TimeSplit time;
   PictureReport picture;
   std::optional<Fidelity> fidelity;

@@ -14,7 +14,8 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kUnservedS = .25;  // what a dot costs that no aim serves
 constexpr std::size_t kAimsAtMost = 2000;
-constexpr std::size_t kBlock = 1 << 14;  // dots whose aims are chosen together
+constexpr std::size_t kBlock = 1 << 12;  // dots whose aims are chosen together
+constexpr std::size_t kBlocksAtOnce = 16;
 constexpr int kExchangeRounds = 2;
 
 /// Evenly spread over the sphere (Fibonacci lattice).
@@ -39,11 +40,13 @@ class AimLocation {
     ask_sample();
   }
 
-  std::vector<Eigen::Vector3d> solve() {
-    while (open_.size() < kAimsAtMost && open_best()) {
-    }
+  std::vector<Eigen::Vector3d> solve(const Progress& progress) {
+    // How many there will be is not known; the progress told approaches one all the same.
+    const auto tell = [&](double done) { progress(done / (done + 300)); };
+    double done = 0;
+    for (; open_.size() < kAimsAtMost && open_best(); ++done) tell(done);
     for (int round = 0; round < kExchangeRounds; ++round)
-      for (std::size_t k = 0; k < open_.size();) k += exchange(k) ? 1 : 0;
+      for (std::size_t k = 0; k < open_.size(); tell(++done)) k += exchange(k) ? 1 : 0;
     std::vector<Eigen::Vector3d> beams;
     std::sort(open_.begin(), open_.end());
     for (const std::uint32_t d : open_) beams.push_back(directions_[d]);
@@ -279,15 +282,19 @@ AimCosts aim_costs(const PlanOptions& options) {
   return {.incidence_s = .06, .aim_s = .6, .switch_s = .02, .spacing = 4 * kDegree, .sample = 6000, .kicks = 4};
 }
 
-Aims choose_aims(const AimedDots& dots, const AimCosts& costs) {
+Aims choose_aims(const AimedDots& dots, const AimCosts& costs, const Progress& progress) {
   Aims aims;
-  aims.beams_O = AimLocation(dots, costs).solve();
+  aims.beams_O = AimLocation(dots, costs).solve(part_of(progress, 0, .5));
   aims.of_dot.assign(dots.size(), kNoAim);
   const std::size_t block_count = (dots.size() + kBlock - 1) / kBlock;
-  tbb::parallel_for(std::size_t{0}, block_count, [&](std::size_t b) {
-    BlockOfAims(dots, costs, aims.beams_O)
-        .choose(b * kBlock, std::min(dots.size(), (b + 1) * kBlock), aims.of_dot.data());
-  });
+  const Progress told = part_of(progress, .5, 1);
+  for (std::size_t first = 0; first < block_count; first += kBlocksAtOnce) {
+    tbb::parallel_for(first, std::min(first + kBlocksAtOnce, block_count), [&](std::size_t b) {
+      const std::size_t end = std::min(dots.size(), (b + 1) * kBlock);
+      BlockOfAims(dots, costs, aims.beams_O).choose(b * kBlock, end, aims.of_dot.data());
+    });
+    told(static_cast<double>(std::min(first + kBlocksAtOnce, block_count)) / static_cast<double>(block_count));
+  }
   return aims;
 }
 

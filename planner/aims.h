@@ -55,6 +55,6 @@ struct Aims {
 
 /// Cost: O(sample * directions + dots * aims) with a few clearance tests a dot, in parallel; 2 bytes a dot. The same
 /// for any number of threads.
-Aims choose_aims(const AimedDots& dots, const AimCosts& costs);
+Aims choose_aims(const AimedDots& dots, const AimCosts& costs, const Progress& progress = {});
 
 }  // namespace hilbrush

@@ -13,6 +13,7 @@ namespace {
 /// Where a dot cannot be exposed within the preferred incidence, its pose may deviate so much more than the best one
 /// found.
 constexpr double kIncidenceSlack = 4 * std::numbers::pi / 180;
+constexpr std::size_t kAtOnce = 512;  // between two words of progress
 constexpr std::size_t kAskedPoses = 48, kAskedDots = 1500;
 /// A station that serves fewer of the dots asked is not looked for among their poses any more.
 constexpr std::size_t kFewServed = 2;
@@ -28,21 +29,17 @@ class Leftovers {
  public:
   Leftovers(const AimedDots& dots, std::vector<Tour>& tours) : dots_(dots), reach_(dots.reach()), tours_(tours) {}
 
-  void find_poses(const std::vector<std::uint32_t>& left, std::vector<SkippedDot>& skipped) {
+  void find_poses(const std::vector<std::uint32_t>& left, std::vector<SkippedDot>& skipped, const Progress& progress) {
     left_.resize(left.size());
     std::vector<SkippedDot> refused(left.size());
     const Joints home = home_joints(reach_.cell);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, left.size(), 64), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        left_[i].dot = left[i];
-        refused[i].dot_index = dots_.dot_index(left[i]);
-        const auto pose = reach_.find_pose(dots_.target(left[i]), home, &refused[i]);
-        if (!pose) continue;
-        left_[i].is_reachable = true;
-        left_[i].station = {pose->table.tilt, pose->table.rotation, pose->yaw, pose->elbow};
-        left_[i].cos_allowed = std::cos(std::max(kept_incidence(reach_.options), pose->from_smooth + kIncidenceSlack));
-      }
-    });
+    for (std::size_t first = 0; first < left.size(); first += kAtOnce) {
+      const std::size_t end = std::min(left.size(), first + kAtOnce);
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, 16), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) find_pose(left[i], home, left_[i], refused[i]);
+      });
+      progress(static_cast<double>(end) / static_cast<double>(left.size()));
+    }
     for (std::size_t i = 0; i < left.size(); ++i)
       if (!left_[i].is_reachable) skipped.push_back(std::move(refused[i]));
     std::erase_if(left_, [](const Leftover& leftover) { return !leftover.is_reachable; });
@@ -58,16 +55,28 @@ class Leftovers {
     remove([&](std::size_t i) { return joined[i] < tours_.size(); });
   }
 
-  void open_stations() {
+  void open_stations(const Progress& progress) {
+    const auto all = static_cast<double>(left_.size());
     while (!left_.empty()) {
       const auto [pose, served] = most_serving();
       if (served < kFewServed) break;
       open_station(pose);
+      progress(1 - static_cast<double>(left_.size()) / all);
     }
     while (!left_.empty()) open_station(0);
   }
 
  private:
+  void find_pose(std::uint32_t dot, const Joints& home, Leftover& leftover, SkippedDot& refused) const {
+    leftover.dot = dot;
+    refused.dot_index = dots_.dot_index(dot);
+    const auto pose = reach_.find_pose(dots_.target(dot), home, &refused);
+    if (!pose) return;
+    leftover.is_reachable = true;
+    leftover.station = {pose->table.tilt, pose->table.rotation, pose->yaw, pose->elbow};
+    leftover.cos_allowed = std::cos(std::max(kept_incidence(reach_.options), pose->from_smooth + kIncidenceSlack));
+  }
+
   bool serves(const Station& station, const Eigen::Vector3d& beam_O, const Leftover& leftover) const {
     const Target target = dots_.target(leftover.dot);
     return -beam_O.dot(target.smooth_normal_O) >= leftover.cos_allowed &&
@@ -134,12 +143,12 @@ class Leftovers {
 }  // namespace
 
 void serve_leftovers(const AimedDots& dots, std::vector<std::uint32_t> left, std::vector<Tour>& tours,
-                     std::vector<SkippedDot>& skipped) {
+                     std::vector<SkippedDot>& skipped, const Progress& progress) {
   std::sort(left.begin(), left.end());
   Leftovers leftovers(dots, tours);
-  leftovers.find_poses(left, skipped);
+  leftovers.find_poses(left, skipped, part_of(progress, 0, .5));
   leftovers.join_tours();
-  leftovers.open_stations();
+  leftovers.open_stations(part_of(progress, .5, 1));
   for (Tour& tour : tours) std::sort(tour.dots.begin(), tour.dots.end());
 }
 

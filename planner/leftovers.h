@@ -10,6 +10,6 @@ namespace hilbrush {
 /// Cost: a full search for a pose for each dot in `left`, in parallel; then clearance tests for dots and poses whose
 /// normals agree.
 void serve_leftovers(const AimedDots& dots, std::vector<std::uint32_t> left, std::vector<Tour>& tours,
-                     std::vector<SkippedDot>& skipped);
+                     std::vector<SkippedDot>& skipped, const Progress& progress = {});
 
 }  // namespace hilbrush

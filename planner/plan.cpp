@@ -33,11 +33,6 @@ std::vector<std::uint32_t> dots_with_energy(const CellDescription& cell, const D
   return indices;
 }
 
-Progress part_of(const Progress& progress, double from, double to) {
-  if (!progress) return {};
-  return [progress, from, to](double fraction) { progress(from + (to - from) * fraction); };
-}
-
 }  // namespace
 
 Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress& progress) {

@@ -15,6 +15,8 @@
 namespace hilbrush {
 namespace {
 
+constexpr std::size_t kToursAtOnce = 16;  // between two words of progress
+
 std::vector<Tour> tours_of(const Aims& aims, std::vector<std::uint32_t>& left) {
   std::vector<Tour> tours(aims.beams_O.size());
   for (std::size_t k = 0; k < tours.size(); ++k) tours[k].beam_O = aims.beams_O[k];
@@ -98,13 +100,12 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   const AimCosts costs = aim_costs(reach.options);
   PosedDots posed;
   std::vector<std::uint32_t> left;
-  std::vector<Tour> tours = tours_of(choose_aims(aimed, costs), left);
-  tell(.4);
+  std::vector<Tour> tours = tours_of(choose_aims(aimed, costs, part_of(progress, 0, .4)), left);
   place_stations(aimed, tours, left);
   remove_misfits(aimed, tours, left);
   tell(.5);
   const std::size_t common = tours.size();
-  serve_leftovers(aimed, std::move(left), tours, posed.skipped);
+  serve_leftovers(aimed, std::move(left), tours, posed.skipped, part_of(progress, .5, .7));
   if (tours.size() > common) {
     std::vector<std::uint32_t> none;
     place_stations(aimed, tours, none);
@@ -116,8 +117,11 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   for (std::size_t t = 0; t < tours.size(); ++t)
     first[t] = before = wind(reach, aimed.position_O(tours[t].dots.front()), before, tours[t].station);
   std::vector<std::vector<PosedDot>> parts(tours.size());
-  tbb::parallel_for(std::size_t{0}, tours.size(),
-                    [&](std::size_t t) { parts[t] = posed_tour(aimed, costs, tours[t], first[t]); });
+  for (std::size_t begin = 0; begin < tours.size(); begin += kToursAtOnce) {
+    const std::size_t end = std::min(tours.size(), begin + kToursAtOnce);
+    tbb::parallel_for(begin, end, [&](std::size_t t) { parts[t] = posed_tour(aimed, costs, tours[t], first[t]); });
+    tell(.7 + .3 * static_cast<double>(end) / static_cast<double>(tours.size()));
+  }
   posed.sequence.reserve(dot_indices.size());
   before = home_joints(reach.cell);
   for (auto& part : parts) {

@@ -4,6 +4,7 @@
 
 #include "planner/reach.h"
 #include "sampling/dots.h"
+#include "sampling/progress.h"
 
 /// What pose search hands on: which dots are exposed, in which order, with which joints. How the axes get from one to
 /// the next is the program builder's.
@@ -21,6 +22,9 @@ struct PosedDots {
 
 Target target_of(const Dot& dot);
 Joints home_joints(const CellDescription& cell);
+
+/// Progress within a stage that goes from one fraction of the whole to another.
+Progress part_of(const Progress& progress, double from, double to);
 
 /// Move and settle of a direct move between two exposures.
 double step_s(const CellDescription& cell, const Joints& from, const Joints& to);

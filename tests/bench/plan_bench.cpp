@@ -1,8 +1,10 @@
 // Painting time, incidence and planning cost of the baselines and of every way of planning, on the same dots' counts,
 // by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program passes the same check.
-//   plan_bench MODEL SIZE_MM DOTS [ROW...]      rows: laminar curve thesis fast balanced quality; all unless named
-//   plan_bench --trade MODEL SIZE_MM DOTS       painting time over incidence, by preferred incidence and planning
+//   plan_bench MODEL SIZE_MM DOTS [ROW...]      rows: laminar space curve thesis fast balanced quality; all unless
+//   named plan_bench --trade MODEL SIZE_MM DOTS       painting time over incidence, by preferred incidence and planning
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -35,12 +37,14 @@ struct Row {
   Sampler sampler;
   CurveKind curve;
   PlanOptions options;
+  bool is_in_space = false;  ///< dots in the order of a Hilbert curve through space instead of the surface's own
 };
 
 const std::vector<Row>& rows() {
   static const PlanOptions follow{.policy = PosePolicy::kFollowNormal};
   static const std::vector<Row> all{
       {"laminar", Sampler::kCentroid, CurveKind::kLaminar, follow},
+      {"space", Sampler::kCentroid, CurveKind::kHilbert, follow, true},
       {"curve", Sampler::kCentroid, CurveKind::kHilbert, follow},
       {"thesis", Sampler::kJittered, CurveKind::kHilbert, follow},
       {"fast", Sampler::kCentroid, CurveKind::kHilbert, {.planning = Planning::kFast}},
@@ -48,6 +52,42 @@ const std::vector<Row>& rows() {
       {"quality", Sampler::kCentroid, CurveKind::kHilbert, {.planning = Planning::kQuality}},
   };
   return all;
+}
+
+/// Place on the Hilbert curve through the unit cube, ten levels (Skilling 2004, transposed axes to bits).
+std::uint64_t place_in_space(const Eigen::Vector3d& p) {
+  constexpr int kLevels = 10;
+  std::array<std::uint32_t, 3> x;
+  for (std::size_t i = 0; i < 3; ++i)
+    x[i] = static_cast<std::uint32_t>(std::clamp(p[static_cast<Eigen::Index>(i)], 0., .999999) * (1 << kLevels));
+  for (std::uint32_t q = 1U << (kLevels - 1); q > 1; q >>= 1)
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (x[i] & q) {
+        x[0] ^= q - 1;
+      } else {
+        const std::uint32_t t = (x[0] ^ x[i]) & (q - 1);
+        x[0] ^= t;
+        x[i] ^= t;
+      }
+    }
+  for (std::size_t i = 1; i < 3; ++i) x[i] ^= x[i - 1];
+  std::uint32_t t = 0;
+  for (std::uint32_t q = 1U << (kLevels - 1); q > 1; q >>= 1)
+    if (x[2] & q) t ^= q - 1;
+  for (auto& axis : x) axis ^= t;
+  std::uint64_t place = 0;
+  for (int level = kLevels - 1; level >= 0; --level)
+    for (const std::uint32_t axis : x) place = place << 1 | (axis >> level & 1);
+  return place;
+}
+
+void sort_in_space(DotSequence& dots) {
+  Eigen::AlignedBox3d box;
+  for (const Dot& dot : dots.dots) box.extend(dot.position_O);
+  const double size_m = box.sizes().maxCoeff();
+  std::stable_sort(dots.dots.begin(), dots.dots.end(), [&](const Dot& a, const Dot& b) {
+    return place_in_space((a.position_O - box.min()) / size_m) < place_in_space((b.position_O - box.min()) / size_m);
+  });
 }
 
 struct Bench {
@@ -64,7 +104,10 @@ struct Bench {
     SampleOptions options;
     options.dot_count = count;
     options.sampler = row.sampler;
-    return row.curve == CurveKind::kLaminar ? place_laminar(mesh, tone, options) : place_dots(curve, tone, options);
+    if (row.curve == CurveKind::kLaminar) return place_laminar(mesh, tone, options);
+    DotSequence placed = place_dots(curve, tone, options);
+    if (row.is_in_space) sort_in_space(placed);
+    return placed;
   }
   void run(const Row& row, std::uint64_t count) const;
 

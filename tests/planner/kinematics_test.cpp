@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include "planner/check_cell.h"
 #include "planner/reach.h"
@@ -24,11 +27,18 @@ Joints random_joints(const CellDescription& cell, std::mt19937& random) {
   return joints;
 }
 
+/// A slice of the ten million poses, or all with HILBRUSH_LONG=1.
+int pose_count() {
+  return std::getenv("HILBRUSH_LONG") ? 10'000'000 : 200'000;
+}
+
 TEST(Kinematics, InverseOfForwardIsTheSamePose) {
   const CellDescription cell = default_cell();
   const Kinematics kinematics(cell);
-  std::mt19937 random(11);
-  for (int n = 0; n < 100'000; ++n) {
+  constexpr unsigned kSeed = 11;
+  std::mt19937 random(kSeed);
+  double worst_m = 0, worst_rad = 0;
+  for (int n = 0; n < pose_count(); ++n) {
     const Joints joints = random_joints(cell, random);
     if (std::abs(std::sin(joints[kJ2])) < 1e-3) continue;  // the straight arm, which planning keeps away from
     const ToolPose tool = kinematics.tool_pose(joints);
@@ -37,8 +47,10 @@ TEST(Kinematics, InverseOfForwardIsTheSamePose) {
       Joints found = joints;
       ASSERT_TRUE(kinematics.solve_arm(table.to_W(tool.focus_O), kinematics.yaw(joints), elbow, found)) << "pose " << n;
       const ToolPose again = kinematics.tool_pose(found);
-      ASSERT_LT((again.focus_O - tool.focus_O).norm(), 1e-9) << "pose " << n;
-      ASSERT_LT((again.beam_O - tool.beam_O).norm(), 1e-9) << "pose " << n;
+      worst_m = std::max(worst_m, (again.focus_O - tool.focus_O).norm());
+      worst_rad = std::max(worst_rad, (again.beam_O - tool.beam_O).norm());
+      ASSERT_LT(worst_m, 1e-9) << "pose " << n << ", seed " << kSeed;
+      ASSERT_LT(worst_rad, 1e-9) << "pose " << n << ", seed " << kSeed;
       ASSERT_EQ(elbow == Elbow::kPositive, found[kJ2] > 0);
       if ((joints[kJ2] > 0) == (elbow == Elbow::kPositive)) {
         ASSERT_NEAR(found[kJ2], joints[kJ2], 1e-9) << "pose " << n;
@@ -46,6 +58,37 @@ TEST(Kinematics, InverseOfForwardIsTheSamePose) {
       }
     }
   }
+  RecordProperty("worst_m", std::to_string(worst_m));
+  RecordProperty("worst_rad", std::to_string(worst_rad));
+}
+
+TEST(Kinematics, InverseOfTheWholeChainIsTheSameBeamOnTheSameDot) {
+  // Only dot, beam and tilt are given: rotation, yaw and the arm are solved for, two ways and with both elbows.
+  const CellDescription cell = default_cell();
+  const Kinematics kinematics(cell);
+  constexpr unsigned kSeed = 17;
+  std::mt19937 random(kSeed);
+  std::size_t solved = 0;
+  for (int n = 0; n < pose_count() / 2; ++n) {
+    const Joints joints = random_joints(cell, random);
+    if (std::abs(std::sin(joints[kTilt])) < 1e-3) continue;  // A = 0: C turns about the same axis as yaw
+    const ToolPose tool = kinematics.tool_pose(joints);
+    TableSolution solutions[2];
+    const int count = solve_table(kinematics, joints[kTilt], tool.beam_O, solutions);
+    for (int s = 0; s < count; ++s)
+      for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
+        const TablePose table = kinematics.table_pose(joints[kTilt], solutions[s].rotation);
+        Joints found{};
+        found[kTilt] = joints[kTilt];
+        found[kRotation] = solutions[s].rotation;
+        if (!kinematics.solve_arm(table.to_W(tool.focus_O), solutions[s].yaw, elbow, found)) continue;
+        ++solved;
+        const ToolPose again = kinematics.tool_pose(found);
+        ASSERT_LT((again.focus_O - tool.focus_O).norm(), 1e-9) << "pose " << n << ", seed " << kSeed;
+        ASSERT_LT((again.beam_O - tool.beam_O).norm(), 1e-9) << "pose " << n << ", seed " << kSeed;
+      }
+  }
+  EXPECT_GT(solved, static_cast<std::size_t>(pose_count()) / 4);
 }
 
 TEST(Kinematics, AgreesWithTheChainOfTransformsThatTheCheckUses) {
