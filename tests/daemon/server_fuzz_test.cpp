@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <random>
 
 #include "config/rpc_errors.h"
@@ -145,6 +148,31 @@ TEST(ServerFuzzTest, EveryRequestGetsOneAnswerWhateverItAsks) {
       client = std::make_unique<LineClient>(world.options.socket);
     }
   }
+}
+
+/// What rpc_fuzzer starts from, and whatever it has found: each file is one client's conversation.
+TEST(ServerFuzzTest, TheCorpusIsAnsweredAndTheDaemonGoesOn) {
+  DaemonWorld world;
+  world.begin();
+  std::size_t files = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(HILBRUSH_SOURCE_DIR) + "/tests/daemon/corpus/rpc")) {
+    SCOPED_TRACE(entry.path().string());
+    std::ifstream in(entry.path(), std::ios::binary);
+    LineClient client(world.options.socket);
+    client.send_bytes(std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>()));
+    client.end_sending();
+    std::size_t answers = 0;
+    while (const auto line = client.read_line()) {
+      EXPECT_FALSE(Json::parse(*line, nullptr, false).is_discarded()) << *line;
+      ++answers;
+    }
+    EXPECT_GT(answers, 0u);
+    ++files;
+  }
+  EXPECT_GT(files, 5u);
+  LineClient client(world.options.socket);
+  EXPECT_EQ(client.result("cell.status").at("cell").at("laser"), "off");
 }
 
 }  // namespace
