@@ -136,6 +136,7 @@ LaserOptions read_laser_link(JsonObject& json, const DeviceContext& context) {
   options.power_min_w = context.cell.laser.power_min_w;
   options.power_max_w = context.cell.laser.power_max_w;
   if (json.has("arm_timeout_s")) options.arm_timeout_s = json.quantity("arm_timeout_s", {1, 3600});
+  if (json.has("command_gap_ms")) options.command_gap_s = json.quantity("command_gap_ms", {0, 1000});
   if (json.has("heartbeat_ms")) options.heartbeat_s = json.quantity("heartbeat_ms", {1, 1000});
   options.heartbeats_missed =
       static_cast<int>(json.optional_integer("heartbeats_missed", 1, 100).value_or(options.heartbeats_missed));

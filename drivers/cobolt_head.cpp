@@ -52,12 +52,13 @@ LaserHead::Powers CoboltHead::read_powers() {
   return {0, ask_number("glp?") * 1e-3};
 }
 
+/// The mode alone says that all is well; what is wrong is asked only then, because commands must keep their distance.
 LineLaser::Condition CoboltHead::read_condition() {
-  Condition condition;
-  condition.is_interlock_closed = ask_integer("ilk?") == cobolt::kInterlockClosed;
   const auto mode = static_cast<cobolt::Mode>(ask_integer("gom?"));
+  Condition condition;
   condition.is_key_in = mode != cobolt::Mode::kWaitingForKey;
   condition.is_armed = mode == cobolt::Mode::kModulation;
+  condition.is_interlock_closed = condition.is_armed || ask_integer("ilk?") == cobolt::kInterlockClosed;
   if (mode == cobolt::Mode::kFault && condition.is_interlock_closed) {
     const std::string fault = cobolt::fault_text(ask_integer("f?"));
     condition.fault = fault.empty() ? "a fault without a name" : "a fault: " + fault;

@@ -13,13 +13,11 @@
 namespace hilbrush {
 
 /// A Hübner (Cobolt) 06 laser in modulation mode. Gated by its own fast commands (!e, !d: command modulation) or by a
-/// digital line, as `is_gated_by_line` says. Ordinary commands keep the distance that the maker's own library keeps.
+/// digital line, as `is_gated_by_line` says. Ordinary commands keep a distance of LaserOptions::command_gap_s.
 class CoboltHead final : public LineLaser {
  public:
-  static constexpr double kGapS = 0.1;  ///< wall, between two commands that are answered
-
   CoboltHead(const LaserOptions& options, bool is_gated_by_line, Clock& clock)
-      : LineLaser(options, kGapS, clock), is_gated_by_line_(is_gated_by_line) {}
+      : LineLaser(options, options.command_gap_s, clock), is_gated_by_line_(is_gated_by_line) {}
   ~CoboltHead() override { end_polling(); }
 
   std::vector<std::string> identify() override;

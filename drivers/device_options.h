@@ -107,8 +107,10 @@ struct LaserOptions {
   int baud = 115200;
   double power_min_w = 0, power_max_w = 0;  ///< the cell file's, checked against the device's own
   double arm_timeout_s = 30;                ///< start delay and warm-up
-  double heartbeat_s = 0.02;                ///< to its guard
-  int heartbeats_missed = 5;                ///< so many missing in a row disable it
+  /// Wall, between two commands that are answered; Cobolt lasers: what the maker's own library keeps.
+  double command_gap_s = 0.1;
+  double heartbeat_s = 0.02;  ///< to its guard
+  int heartbeats_missed = 5;  ///< so many missing in a row disable it
 };
 
 }  // namespace hilbrush

@@ -149,6 +149,9 @@ const char* dobot_mode_name(DobotMode mode) {
 
 std::optional<DobotFrame> decode_dobot_frame(std::string_view bytes) {
   if (bytes.size() != kDobotFrameBytes || !is_frame_start(bytes)) return std::nullopt;
+  // A second test word: the frame broke off, and the next one began in the middle of it.
+  const std::string_view test_word(reinterpret_cast<const char*>(&kTestWord), sizeof kTestWord);
+  if (bytes.find(test_word, kTestWordAt + 1) != std::string_view::npos) return std::nullopt;
   DobotFrame frame;
   frame.digital_outputs = value_at<std::uint64_t>(bytes, kDigitalOutputsAt);
   frame.mode = static_cast<DobotMode>(value_at<std::uint64_t>(bytes, kModeAt));

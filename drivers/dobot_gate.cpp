@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint64_t kFramesOfGrace = 4;  ///< until a frame must show an output that was confirmed off
 constexpr double kPulseMaxS = 60;
+constexpr double kImpatientS = 0.005;  ///< wall
 
 }  // namespace
 
@@ -35,8 +36,8 @@ void DobotRobot::OutputGate::tell(bool is_dark) {
   robot_.clock_.wake();
 }
 
-void DobotRobot::OutputGate::shut() noexcept {
-  if (!off()) tell(false);
+bool DobotRobot::OutputGate::is_busy() const {
+  return is_pulsing_ || (is_known_off_ && robot_.frame_count_ < known_frame_ + kFramesOfGrace);
 }
 
 bool DobotRobot::OutputGate::agrees_with(const DobotFrame& frame) {
@@ -74,17 +75,22 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
   }
 }
 
-/// The first try may meet a connection that had died unnoticed.
-void DobotRobot::OutputGate::order_off() {
-  const std::string command = encode_dobot("DOExecute", {output_, 0});
+/// Dark first; then the queue is emptied, and what it may have turned on between the two is turned off again: all in
+/// one write, because an emptied queue has lost the end of its pulse. A controller in alarm refuses to be reset, with
+/// an empty queue.
+bool DobotRobot::OutputGate::order_off(bool was_pulsing, double wall_s) noexcept {
   try {
-    robot_.ports_.dashboard(command, DobotPorts::kUrgentS);
-  } catch (const LinkError&) {
-    robot_.ports_.dashboard(command, DobotPorts::kUrgentS);
+    const std::string off = encode_dobot("DOExecute", {output_, 0});
+    std::vector<std::string> commands{off};
+    if (was_pulsing) commands = {off, encode_dobot("ResetRobot"), off};
+    return robot_.ports_.dashboard_all(commands, wall_s).back().error == 0;
+  } catch (const std::exception&) {
+    return false;
   }
 }
 
-/// Dark first; then the queue is emptied, and what it may have turned on between the two is turned off again.
+/// While a pulse may be on, a controller that doesn't answer at once is not waited for: the listener is told to turn
+/// off whatever else there is to turn off. The second try opens a new connection.
 bool DobotRobot::OutputGate::off() noexcept {
   try {
     bool was_pulsing = false;
@@ -94,18 +100,11 @@ bool DobotRobot::OutputGate::off() noexcept {
         return true;
       was_pulsing = is_pulsing_;
     }
-    order_off();
-    if (was_pulsing) {
-      try {
-        robot_.ports_.dashboard(encode_dobot("ResetRobot"), DobotPorts::kUrgentS);
-      } catch (const LinkError&) {
-        throw;
-      } catch (const DriverError&) {
-        // A controller in alarm refuses: its queue is empty.
-      }
-      order_off();
-      robot_.ports_.forget_owed();
+    if (!order_off(was_pulsing, was_pulsing ? kImpatientS : DobotPorts::kUrgentS)) {
+      tell(false);
+      if (!order_off(was_pulsing, DobotPorts::kUrgentS)) return false;
     }
+    if (was_pulsing) robot_.ports_.forget_owed();
     {
       const std::lock_guard lock(robot_.mutex_);
       note_off();

@@ -18,18 +18,18 @@ class DobotRobot::OutputGate final : public Gate {
   bool is_on() override;
   void set_listener(Listener listener) override;
 
-  /// After a fault of the robot: off, and if that is not confirmed the listener is told. No lock held.
-  void shut() noexcept;
   /// Reader's thread, under the robot's mutex: false if the output is on though nobody ordered it.
   bool agrees_with(const DobotFrame& frame);
   bool is_pulsing() const { return is_pulsing_; }  ///< under the robot's mutex
+  /// A pulse is queued or just over, so that the controller may still call itself running. Under the robot's mutex.
+  bool is_busy() const;
   /// The robot was disconnected or lost: nothing is known. Under the robot's mutex.
   void forget() { is_known_off_ = false; }
 
  private:
   void note_off();
   void tell(bool is_dark);
-  void order_off();
+  bool order_off(bool was_pulsing, double wall_s) noexcept;
 
   DobotRobot& robot_;
   const int output_;

@@ -69,38 +69,50 @@ void DobotPorts::close() noexcept {
   feedback_.reset();
 }
 
-std::string DobotPorts::exchange(const std::string& command, Deadline deadline) {
+std::vector<DobotReply> DobotPorts::exchange(const std::vector<std::string>& commands, Deadline deadline) {
   if (!dashboard_) dashboard_ = open_tcp_link(options_.host, options_.dashboard_port, deadline);
-  dashboard_->write(command, deadline);
-  DobotReplyStream replies;
-  for (;;) {
+  std::string all;
+  for (const std::string& command : commands) all += command;
+  dashboard_->write(all, deadline);
+  const auto fail_with = [&](const char* what) {
+    throw LinkError("the robot " + std::string(what) + " to " + all + dashboard_->messages().text());
+  };
+  std::vector<DobotReply> replies;
+  DobotReplyStream stream;
+  while (replies.size() < commands.size()) {
     std::array<char, 1024> bytes{};
     const std::size_t got = dashboard_->read(bytes.data(), bytes.size(), deadline);
-    if (got == 0) throw LinkError("the robot does not answer " + command + dashboard_->messages().text());
+    if (got == 0) fail_with("gives no answer");
     dashboard_->messages().received({bytes.data(), got});
-    replies.push({bytes.data(), got});
-    if (const auto text = replies.next()) {
-      const auto reply = decode_dobot_reply(*text);
-      if (!reply || !is_dobot_echo(reply->command, command) || !replies.is_empty())
-        throw LinkError("the robot gives no proper answer to " + command + dashboard_->messages().text());
-      if (reply->error != 0) throw DriverError(refused(command, *reply) + dashboard_->messages().text());
-      return reply->values;
+    stream.push({bytes.data(), got});
+    while (const auto text = stream.next()) {
+      auto reply = decode_dobot_reply(*text);
+      if (!reply || replies.size() == commands.size() || !is_dobot_echo(reply->command, commands[replies.size()]))
+        fail_with("gives no proper answer");
+      replies.push_back(std::move(*reply));
     }
-    if (replies.is_overlong())
-      throw LinkError("the robot gives an endless answer to " + command + dashboard_->messages().text());
+    if (stream.is_overlong()) fail_with("gives an endless answer");
   }
+  if (!stream.is_empty()) fail_with("gives more than an answer");
+  return replies;
 }
 
-std::string DobotPorts::dashboard(const std::string& command, double wall_s) {
+std::vector<DobotReply> DobotPorts::dashboard_all(const std::vector<std::string>& commands, double wall_s) {
   const Deadline deadline = deadline_in(wall_s);
   const std::unique_lock lock(dashboard_mutex_, deadline);
   if (!lock) throw LinkError("the robot's dashboard is busy with a command that gets no answer");
   try {
-    return exchange(command, deadline);
+    return exchange(commands, deadline);
   } catch (const LinkError&) {
     dashboard_.reset();
     throw;
   }
+}
+
+std::string DobotPorts::dashboard(const std::string& command, double wall_s) {
+  const DobotReply reply = dashboard_all({command}, wall_s).front();
+  if (reply.error != 0) throw DriverError(refused(command, reply));
+  return reply.values;
 }
 
 void DobotPorts::motion(const std::string* commands, std::size_t count, std::size_t later_count, OnReply on_later) {

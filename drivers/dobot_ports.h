@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "drivers/device_options.h"
 #include "drivers/dobot_codec.h"
@@ -42,6 +43,10 @@ class DobotPorts {
   /// one can't be taken for another's. @throws LinkError; DriverError if the controller refuses.
   std::string dashboard(const std::string& command, double wall_s = kReplyS);
 
+  /// Several commands in one write, so that nothing comes between them; their replies in the same order, refusals
+  /// included. @throws LinkError
+  std::vector<DobotReply> dashboard_all(const std::vector<std::string>& commands, double wall_s);
+
   /// Called by the reader's thread with the reply, or with nothing if it will never come.
   using OnReply = std::function<void(const DobotReply*)>;
   /// Queues commands in one write and waits until all but `later_count` of them are answered; `on_later` gets the last
@@ -63,7 +68,7 @@ class DobotPorts {
   void read_motion();
   void settle_reply(const std::string& text);
   void fail(const std::string& sentence);
-  std::string exchange(const std::string& command, Deadline deadline);
+  std::vector<DobotReply> exchange(const std::vector<std::string>& commands, Deadline deadline);
 
   const DobotOptions options_;
   const double feedback_silence_s_;  ///< wall

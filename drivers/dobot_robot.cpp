@@ -81,7 +81,7 @@ void DobotRobot::shut_gates() noexcept {
     const std::lock_guard lock(mutex_);
     for (const auto& [output, gate] : gates_) gates.push_back(gate.get());
   }
-  for (OutputGate* gate : gates) gate->shut();
+  for (OutputGate* gate : gates) gate->off();
 }
 
 void DobotRobot::connect() {
@@ -168,6 +168,17 @@ void DobotRobot::disable() noexcept {
   }
   const std::lock_guard lock(mutex_);
   if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
+}
+
+/// Emptying the queue drops the end of a pulse with the rest.
+void DobotRobot::shut_pulses() noexcept {
+  std::vector<OutputGate*> gates;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [output, gate] : gates_)
+      if (gate->is_pulsing()) gates.push_back(gate.get());
+  }
+  for (OutputGate* gate : gates) gate->off();
 }
 
 void DobotRobot::wait_for_alarm_end() {
@@ -265,7 +276,10 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
 }
 
 bool DobotRobot::is_at_target(const DobotFrame& frame) const {
-  if (frame.mode != DobotMode::kEnabled || frame.is_running) return false;
+  // While the queue times a pulse the controller calls itself running.
+  const bool is_busy =
+      std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) { return gate.second->is_busy(); });
+  if (!is_busy && (frame.mode != DobotMode::kEnabled || frame.is_running)) return false;
   for (std::size_t i = 0; i < target_.size(); ++i)
     if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) ||
         !(std::abs(frame.actual[i] - target_[i]) <= window_of(options_, i)) ||
@@ -343,6 +357,7 @@ void DobotRobot::stop() noexcept {
       if (state_ == DeviceState::kDisconnected || state_ == DeviceState::kConnected) return;
       is_target_current_ = is_in_position_ = false;
     }
+    shut_pulses();
     ports_.dashboard(encode_dobot("ResetRobot"), DobotPorts::kUrgentS);
     ports_.forget_owed();
   } catch (const std::exception& error) {

@@ -54,6 +54,7 @@ class DobotRobot final : public Robot {
   bool is_at_target(const DobotFrame& frame) const;
   void fail(const std::string& sentence);
   void shut_gates() noexcept;
+  void shut_pulses() noexcept;
   void wait_for_alarm_end();
   bool set_fault(const std::string& sentence);
   void require(DeviceState state, const char* participle);

@@ -83,6 +83,8 @@ std::vector<std::string> to_command_line(const GuardArguments& arguments) {
           std::to_string(laser.baud),
           "--arm-timeout-s",
           number(laser.arm_timeout_s),
+          "--command-gap-s",
+          number(laser.command_gap_s),
           "--heartbeat-s",
           number(laser.heartbeat_s),
           "--heartbeats-missed",
@@ -117,6 +119,8 @@ GuardArguments from_command_line(const std::vector<std::string>& words) {
       laser.baud = static_cast<int>(number(1200, 1e6));
     else if (key == "--arm-timeout-s")
       laser.arm_timeout_s = number(1, 3600);
+    else if (key == "--command-gap-s")
+      laser.command_gap_s = number(0, 10);
     else if (key == "--heartbeat-s")
       laser.heartbeat_s = number(0.001, 1);
     else if (key == "--heartbeats-missed")

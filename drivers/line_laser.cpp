@@ -297,7 +297,7 @@ void LineLaser::poll() {
     try {
       const double begun_s = clock_.now_s();
       const Condition condition = read_condition();
-      if (was_asked) check_power();
+      if (was_asked && gap_s_ <= 0) check_power();  // where commands must keep a distance that would cost too much
       take(condition, begun_s);
       if ((was_asked || was_closed != condition.is_interlock_closed) && on_change_) on_change_();
     } catch (const DriverError& error) {

@@ -146,9 +146,10 @@ void MappedDrive::run(const std::vector<RegisterStep>& steps, const char* gerund
     else if (step.source == Source::kConstant || move == nullptr)
       write(reg, step.value);
     else
-      write(reg, register_map::to_register(reg, step.source == Source::kTarget  ? move->target
-                                                : step.source == Source::kSpeed ? move->speed
-                                                                                : move->acceleration));
+      write(reg,
+            register_map::to_register(reg, step.source == Source::kTarget  ? static_cast<double>(move->target)
+                                           : step.source == Source::kSpeed ? static_cast<double>(move->speed)
+                                                                           : static_cast<double>(move->acceleration)));
   }
 }
 

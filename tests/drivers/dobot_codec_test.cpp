@@ -1,0 +1,132 @@
+#include "drivers/dobot_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+/// Pinned to the words of the manual "TCP_IP Remote Control Interface Guide (4axis)".
+namespace hilbrush {
+namespace {
+
+TEST(DobotCodec, CommandsAreWrittenAsInTheManual) {
+  EXPECT_EQ(encode_dobot("EnableRobot"), "EnableRobot()");
+  EXPECT_EQ(encode_dobot("SpeedFactor", {80}), "SpeedFactor(80)");
+  EXPECT_EQ(encode_dobot("DOExecute", {1, 0}), "DOExecute(1,0)");
+  EXPECT_EQ(encode_dobot_joint_move({1.5, -90, 123.4567891, 0}), "JointMovJ(1.500000,-90.000000,123.456789,0.000000)");
+  const auto pulse = encode_dobot_pulse(2, 5);
+  EXPECT_EQ(pulse[0] + pulse[1] + pulse[2] + pulse[3], "DO(2,1)wait(5)DO(2,0)Sync()");
+}
+
+TEST(DobotCodec, RepliesAreTakenApart) {
+  auto reply = decode_dobot_reply("0,{5},RobotMode()");
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->error, 0);
+  EXPECT_EQ(reply->values, "5");
+  EXPECT_EQ(reply->command, "RobotMode()");
+
+  reply = decode_dobot_reply("-40001,{},DOExecute(99,0)");
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->error, -40001);
+  EXPECT_NE(dobot_error_text(reply->error).find("parameter 1 is out of range"), std::string::npos);
+  EXPECT_NE(dobot_error_text(-30002).find("parameter 2 is of a wrong type"), std::string::npos);
+  EXPECT_NE(dobot_error_text(-10000).find("unknown"), std::string::npos);
+  EXPECT_NE(dobot_error_text(-20000).find("number of parameters"), std::string::npos);
+
+  reply = decode_dobot_reply("\n0,{[[17],[],[],[]]},GetErrorID() ");
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->values, "[[17],[],[],[]]");
+}
+
+TEST(DobotCodec, WhatIsNoReplyIsRefused) {
+  for (const char* text : {"", "0", "0,", "0,{}", "0,{},", "0,{},RobotMode", ",{},RobotMode()", "0,{,RobotMode()",
+                           "0;{};RobotMode()", "ok", "0,}{,RobotMode()", "99999999999999999999999,{},A()", "0,{},()"})
+    EXPECT_FALSE(decode_dobot_reply(text)) << text;
+}
+
+TEST(DobotCodec, AnEchoIsRecognisedWithoutRegardToCase) {
+  EXPECT_TRUE(is_dobot_echo("jointmovj(1.0,2,3,4)", "JointMovJ(1.000000,2.000000,3.000000,4.000000)"));
+  EXPECT_TRUE(is_dobot_echo("Sync()", "Sync()"));
+  EXPECT_FALSE(is_dobot_echo("DO(1,0)", "Sync()"));
+  EXPECT_FALSE(is_dobot_echo("DO(1)", "DO(1,0)"));
+  EXPECT_FALSE(is_dobot_echo("SpeedFactor()", "SpeedFactor(5)"));
+  EXPECT_FALSE(is_dobot_echo("", "Sync()"));
+}
+
+/// A packet as the manual's table of offsets has it.
+std::string packet(std::uint64_t time_ms, double first_joint = 12.5) {
+  std::string bytes(kDobotFrameBytes, '\0');
+  const auto put = [&](std::size_t at, const auto& value) { std::memcpy(bytes.data() + at, &value, sizeof value); };
+  put(0, std::uint16_t{1440});
+  put(16, std::uint64_t{0b101});
+  put(24, std::uint64_t{5});
+  put(32, time_ms);
+  put(48, std::uint64_t{0x0123456789ABCDEF});
+  put(192, first_joint);
+  put(432, first_joint + 1);
+  put(480, -3.25);
+  put(1026, std::uint8_t{1});
+  put(1029, std::uint8_t{1});
+  return bytes;
+}
+
+TEST(DobotCodec, FramesAreReadAtTheirOffsets) {
+  const auto frame = decode_dobot_frame(packet(4711));
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->digital_outputs, 0b101u);
+  EXPECT_EQ(frame->mode, DobotMode::kEnabled);
+  EXPECT_EQ(frame->time_ms, 4711u);
+  EXPECT_EQ(frame->setpoint[0], 12.5);
+  EXPECT_EQ(frame->actual[0], 13.5);
+  EXPECT_EQ(frame->speed[0], -3.25);
+  EXPECT_TRUE(frame->is_enabled);
+  EXPECT_FALSE(frame->is_running);
+  EXPECT_TRUE(frame->has_error);
+}
+
+TEST(DobotCodec, FramesWithNonsenseInThemAreNone) {
+  EXPECT_FALSE(decode_dobot_frame(packet(1).substr(1)));
+  EXPECT_FALSE(decode_dobot_frame(packet(1) + "x"));
+  EXPECT_FALSE(decode_dobot_frame(packet(1, std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_FALSE(decode_dobot_frame(packet(1, std::numeric_limits<double>::infinity())));
+  EXPECT_FALSE(decode_dobot_frame(packet(1, 1e300)));
+  std::string bytes = packet(1);
+  bytes[48] ^= 1;
+  EXPECT_FALSE(decode_dobot_frame(bytes));
+}
+
+TEST(DobotCodec, AStreamFindsItsPlaceAgain) {
+  DobotFrameStream stream;
+  const std::string half = packet(2).substr(0, 700);
+  stream.push("rubbish" + packet(1) + half + packet(3));
+  std::string rest = packet(4);
+  ASSERT_TRUE(stream.next());
+  const auto third = stream.next();
+  ASSERT_TRUE(third);
+  EXPECT_EQ(third->time_ms, 3u);  // the half one is lost, and nothing else
+  EXPECT_FALSE(stream.next());
+  EXPECT_EQ(stream.dropped_bytes(), 7u + 700u);
+  for (const char byte : rest) {
+    EXPECT_FALSE(stream.next());
+    stream.push({&byte, 1});
+  }
+  const auto fourth = stream.next();
+  ASSERT_TRUE(fourth);
+  EXPECT_EQ(fourth->time_ms, 4u);
+}
+
+TEST(DobotCodec, ReplyStreamsAreCutAtTheirSemicolons) {
+  DobotReplyStream stream;
+  stream.push("0,{},DO(1,1);0,{},wa");
+  EXPECT_EQ(stream.next(), "0,{},DO(1,1)");
+  EXPECT_EQ(stream.next(), std::nullopt);
+  stream.push("it(5);");
+  EXPECT_EQ(stream.next(), "0,{},wait(5)");
+  EXPECT_TRUE(stream.is_empty());
+  stream.push(std::string(DobotReplyStream::kReplyMax + 1, 'x'));
+  EXPECT_TRUE(stream.is_overlong());
+}
+
+}  // namespace
+}  // namespace hilbrush

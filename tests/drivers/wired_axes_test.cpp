@@ -1,0 +1,123 @@
+#include "config/register_map_file.h"
+#include "drivers/mapped_drive.h"
+#include "tests/drivers/wired_cell.h"
+
+/// Positioning axes over Modbus TCP, each with its maker's table of registers, against the simulated ones.
+namespace hilbrush::test {
+namespace {
+
+constexpr const char* kHere = HILBRUSH_SOURCE_DIR;
+
+WireOptions with_table(WireOptions::Table table) {
+  WireOptions options = WiredCell::quick();
+  options.table = table;
+  return options;
+}
+
+class WiredAxes : public testing::TestWithParam<WireOptions::Table> {
+ protected:
+  WiredAxes() : cell(with_table(GetParam())) {
+    if (cell.table) {
+      table = std::move(cell.table);
+      return;
+    }
+    auto options = cell.axis_options();
+    for (auto& axis : options) axis.homes_to_zero = GetParam() == WireOptions::Table::kLeadshinePr;
+    const RegisterMap map =
+        load_register_map(std::string(kHere) + "/config/axes/" + cell.wire.endpoints().table_map + ".json");
+    auto bus = std::make_shared<ModbusBus>(options[0].endpoint);
+    std::array<std::unique_ptr<AxisDrive>, 2> drives{std::make_unique<MappedDrive>(bus, options[0], map, cell.clock),
+                                                     std::make_unique<MappedDrive>(bus, options[1], map, cell.clock)};
+    table = std::make_unique<DriveGroup<2>>("table", options, std::move(drives), cell.clock);
+  }
+  void move(const Table::Positions& target) {
+    table->move_to(target, .02);
+    ASSERT_TRUE(cell.wait_for([&] { return table->status().in_position; })) << table->status().fault;
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_NEAR(table->status().positions[i], target[i], 1e-5);
+      cell.wire.act([&](TrueCell& truth) {
+        EXPECT_NEAR(truth.position(kTilt + static_cast<int>(i)), target[i], 1e-5);
+        EXPECT_TRUE(truth.is_settled(kTilt + static_cast<int>(i)));
+      });
+    }
+  }
+
+  WiredCell cell;
+  std::unique_ptr<DriveGroup<2>> table;
+};
+
+TEST_P(WiredAxes, GoWhereTheyAreSentOnBothSidesOfZero) {
+  WiredCell::make_ready(*table);
+  move({.1, .3});
+  move({.1, -.5});
+  move({-.1, -.5});
+  move({0, 2});
+  EXPECT_EQ(table->identify().size(), 2u);
+}
+
+TEST_P(WiredAxes, StopOnTheWayAndGoOn) {
+  WiredCell::make_ready(*table);
+  table->move_to({.5, 20}, .02);
+  ASSERT_TRUE(cell.wait_for([&] { return table->status().positions[1] > .2; }));
+  table->stop();
+  table->stop();
+  EXPECT_FALSE(table->status().in_position);
+  bool is_moving = true;
+  EXPECT_TRUE(cell.wait_for([&] {
+    cell.wire.act([&](TrueCell& truth) { is_moving = truth.is_moving(kTilt) || truth.is_moving(kRotation); });
+    return !is_moving;
+  }));
+  EXPECT_LT(table->status().positions[1], 15);
+  move({.1, .3});
+}
+
+TEST_P(WiredAxes, RefuseWhatIsOutsideTheirLimits) {
+  WiredCell::make_ready(*table);
+  EXPECT_THROW(table->move_to({1.9, 0}, .02), DriverError);
+  EXPECT_THROW(table->move_to({0, std::numeric_limits<double>::quiet_NaN()}, .02), DriverError);
+  EXPECT_THROW(table->move_to({0, 0}, -1), DriverError);
+  EXPECT_EQ(table->status().state, DeviceState::kReady);
+}
+
+TEST_P(WiredAxes, AnAlarmIsAFaultThatCanBeCleared) {
+  WiredCell::make_ready(*table);
+  WireFault fault;
+  fault.kind = WireFaultKind::kDeviceAlarm;
+  fault.device = WireDevice::kTable;
+  fault.trigger.at_s = cell.wire.now_s();
+  cell.wire.add_fault(fault);
+  ASSERT_TRUE(cell.wait_for([&] { return table->status().state == DeviceState::kFault; }));
+  EXPECT_FALSE(table->status().fault.empty());
+  cell.wire.clear_faults();
+  table->clear_fault();
+  EXPECT_EQ(table->status().state, DeviceState::kConnected);
+  table->enable();
+  table->home();
+  move({.1, .3});
+}
+
+TEST_P(WiredAxes, ALostConnectionIsAFaultThatCanBeCleared) {
+  WiredCell::make_ready(*table);
+  WireFault fault;
+  fault.kind = WireFaultKind::kDroppedConnection;
+  fault.device = WireDevice::kTable;
+  fault.trigger.at_s = cell.wire.now_s();
+  cell.wire.add_fault(fault);
+  ASSERT_TRUE(cell.wait_for([&] { return table->status().state == DeviceState::kFault; }));
+  EXPECT_NE(table->status().fault.find("last messages"), std::string::npos) << table->status().fault;
+  cell.wire.clear_faults();
+  table->clear_fault();
+  table->enable();
+  table->home();
+  move({.1, .3});
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Maps, WiredAxes,
+    testing::Values(WireOptions::Table::kOrientalAz, WireOptions::Table::kCia402, WireOptions::Table::kLeadshinePr),
+    [](const auto& tested) {
+      return std::string(std::array{"OrientalAz", "Cia402", "LeadshinePr"}[static_cast<std::size_t>(tested.param)]);
+    });
+
+}  // namespace
+}  // namespace hilbrush::test

@@ -1,0 +1,92 @@
+#pragma once
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/cobolt_codec.h"
+#include "drivers/dobot_codec.h"
+#include "drivers/guard_codec.h"
+#include "drivers/guard_process.h"
+#include "drivers/line_codec.h"
+#include "drivers/mapped_drive.h"
+#include "drivers/obis_codec.h"
+#include "drivers/oriental_az.h"
+
+namespace hilbrush {
+
+/// Everything that decodes what devices send, on the same bytes; aborts where a promise is broken. The bytes are cut in
+/// two where the first of them says, as a network may.
+inline void decode_as_every_device(std::string_view bytes) {
+  const auto promise = [](bool is_kept) {
+    if (!is_kept) std::abort();
+  };
+  const std::size_t cut = bytes.empty() ? 0 : static_cast<unsigned char>(bytes[0]) % (bytes.size() + 1);
+
+  DobotFrameStream frames;
+  std::size_t whole = 0;
+  for (const std::string_view piece : {bytes.substr(0, cut), bytes.substr(cut)}) {
+    frames.push(piece);
+    while (const auto frame = frames.next()) {
+      ++whole;
+      for (std::size_t i = 0; i < 4; ++i) promise(std::isfinite(frame->actual[i]) && std::isfinite(frame->setpoint[i]));
+      dobot_mode_name(frame->mode);
+    }
+  }
+  promise(whole * kDobotFrameBytes + frames.dropped_bytes() <= bytes.size());
+
+  DobotReplyStream replies;
+  for (const std::string_view piece : {bytes.substr(0, cut), bytes.substr(cut)}) {
+    replies.push(piece);
+    while (const auto text = replies.next())
+      if (const auto reply = decode_dobot_reply(*text)) {
+        promise(is_dobot_echo(reply->command, reply->command));
+        promise(!dobot_error_text(reply->error).empty());
+      }
+  }
+
+  obis::classify(bytes);
+  obis::decode_switch(bytes);
+  if (const auto word = obis::decode_hex_word(bytes)) obis::fault_text(*word);
+  cobolt::is_ok(bytes);
+  if (const auto number = line_codec::decode_number(bytes)) promise(std::isfinite(*number));
+  if (const auto fault = line_codec::decode_integer(bytes)) cobolt::fault_text(*fault);
+
+  if (const auto request = guard::decode_request(bytes)) {
+    const auto again = guard::decode_request(guard::encode(*request));
+    promise(again && again->verb == request->verb && again->value == request->value);
+  }
+  guard::decode_reply(bytes);
+  if (const auto status = guard::decode_status(bytes)) {
+    const auto again = guard::decode_status(guard::encode(*status));
+    promise(again && again->read_ns == status->read_ns && again->status.state == status->status.state);
+  }
+  std::vector<std::string> words;
+  for (std::size_t start = 0; start < bytes.size();) {
+    const std::size_t end = std::min(bytes.find(' ', start), bytes.size());
+    words.emplace_back(bytes.substr(start, end - start));
+    start = end + 1;
+  }
+  try {
+    from_command_line(words);
+  } catch (const DriverError&) {
+    // refused: fine
+  }
+  if (bytes.size() < 10) return;
+  const auto word_at = [&](std::size_t i) {
+    return static_cast<std::uint16_t>(static_cast<unsigned char>(bytes[i]) << 8 |
+                                      static_cast<unsigned char>(bytes[i + 1]));
+  };
+  const std::array<std::uint16_t, 4> position{word_at(0), word_at(2), word_at(4), word_at(6)};
+  oriental_az::alarm_text(oriental_az::decode_reading(word_at(8), position).alarm);
+  MappedRegister reg;
+  reg.words = 2;
+  reg.is_signed = (bytes[9] & 1) != 0;
+  reg.is_high_word_first = (bytes[9] & 2) != 0;
+  const std::int64_t value = register_map::decode(reg, std::span(position).first(2));
+  promise(register_map::decode(
+              reg, register_map::encode(reg, register_map::to_register(reg, static_cast<double>(value)))) == value);
+}
+
+}  // namespace hilbrush
