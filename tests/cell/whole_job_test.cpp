@@ -50,5 +50,39 @@ TEST(WholeJobTest, OverSerialLines) {
   EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
 }
 
+/// Axes by the shipped register maps.
+TEST(WholeJobTest, ByRegisterMaps) {
+  for (const auto table : {WireOptions::Table::kCia402, WireOptions::Table::kLeadshinePr}) {
+    SCOPED_TRACE(static_cast<int>(table));
+    WireOptions options = WiredWorld::quick(.1);
+    options.table = table;
+    WiredWorld world(options);
+    const ExposureProgram program = small_job(world.description, 20, 4, 5);
+    ExecutionControl control;
+    world.recover(control);
+    Journal journal = Journal::in_memory(program.exposures.size());
+    const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
+    EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+    EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
+  }
+}
+
+/// A laser whose gate is its own serial command, timed by the guard: as exact as a process can be, never in motion.
+TEST(WholeJobTest, ByASerialGate) {
+  WireOptions options = WiredWorld::quick(1);
+  options.laser = WireOptions::LaserHead::kCobolt;
+  WiredWorld world(options);
+  const ExposureProgram program = small_job(world.description, 6, 4, 5);
+  ExecutionControl control;
+  world.recover(control);
+  Journal journal = Journal::in_memory(program.exposures.size());
+  const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
+  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  const auto testimony = test::hear_witness(program, world.emissions());
+  EXPECT_EQ(testimony.in_motion, 0u);
+  EXPECT_EQ(testimony.strays, 0u);
+  for (std::size_t i = 0; i < program.exposures.size(); ++i) EXPECT_EQ(testimony.light[i], 1) << "exposure " << i;
+}
+
 }  // namespace
 }  // namespace hilbrush
