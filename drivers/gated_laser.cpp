@@ -127,7 +127,8 @@ Laser::Status GatedLaser::status() {
   {
     const std::lock_guard lock(mutex_);
     if (is_reading_due_ && head.state == DeviceState::kReady) status.is_emitting = true;
-    status.dark_since_s = status.is_emitting ? 0 : dark_since_s_;
+    // The gate's word comes first, the laser's own account of the pulse after it.
+    status.dark_since_s = !status.is_emitting ? dark_since_s_ : is_reading_due_ ? std::max(0., gate_dark_s_) : 0;
   }
   status.state = status.is_emitting && head.state == DeviceState::kReady ? DeviceState::kMoving : head.state;
   status.interlock_closed = head.interlock_closed;

@@ -28,8 +28,9 @@ CLI::App* add_daemon_command(CLI::App& app, CommandContext& context, const std::
 void add_pipeline_commands(CLI::App& app, CommandContext& context);  ///< dry-run, plan, develop, calibrate
 void add_job_commands(CLI::App& app,
                       CommandContext& context);  ///< submit, watch, list, get, start, pause, resume, move, cancel
-void add_cell_commands(CLI::App& app, CommandContext& context);    ///< status, stop, clear, arm, home, info
-void add_check_command(CLI::App& app, CommandContext& context);    ///< check-config
-void add_quality_command(CLI::App& app, CommandContext& context);  ///< quality
+void add_cell_commands(CLI::App& app, CommandContext& context);           ///< status, stop, clear, arm, home, info
+void add_check_command(CLI::App& app, CommandContext& context);           ///< check-config
+void add_commissioning_commands(CLI::App& app, CommandContext& context);  ///< check-cell, jog
+void add_quality_command(CLI::App& app, CommandContext& context);         ///< quality
 
 }  // namespace hilbrush

@@ -12,6 +12,8 @@
 #include "daemon/commands/interrupt.h"
 #include "daemon/commands/pipeline_run.h"
 #include "daemon/commands/rpc_client.h"
+#include "daemon/server/cell_devices.h"
+#include "drivers/driver_error.h"
 #include "sampling/input_error.h"
 
 namespace hilbrush {
@@ -64,6 +66,10 @@ void quote_child(const CommandContext& context, const std::string& child_stderr)
 int run_action(const CommandContext& context) {
   try {
     return context.action();
+  } catch (const CellHeld& error) {
+    return report_failure(context, kExitRefused, error.at(), error.sentence());
+  } catch (const DriverError& error) {
+    return report_failure(context, kExitRefused, {}, error.what());
   } catch (const InputError& error) {
     return report_failure(context, kExitBadInput, error.at(), error.sentence());
   } catch (const RpcRefusal& error) {
@@ -113,6 +119,7 @@ int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal) 
     add_job_commands(app, context);
     add_cell_commands(app, context);
     add_check_command(app, context);
+    add_commissioning_commands(app, context);
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err), kExitOk;

@@ -7,7 +7,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include "config/cell_devices.h"
 #include "drivers/dobot_robot.h"
 #include "drivers/drive_group.h"
 #include "drivers/gated_laser.h"
@@ -16,7 +15,6 @@
 #include "drivers/mapped_drive.h"
 #include "drivers/oriental_az.h"
 #include "drivers/steady_clock.h"
-#include "sampling/input_error.h"
 #include "sim/devices/sim_cell.h"
 
 namespace hilbrush {
@@ -74,9 +72,8 @@ class CellLock {
     if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
     const int error = errno;
     ::close(fd_);
-    throw InputError(cell_file.string(), error == EWOULDBLOCK
-                                             ? "another process drives this cell: a daemon, or another command"
-                                             : std::strerror(error));
+    if (error != EWOULDBLOCK) throw InputError(cell_file.string(), std::strerror(error));
+    throw CellHeld(cell_file.string(), "another process drives this cell: a daemon, or another command");
   }
   ~CellLock() { ::close(fd_); }
   CellLock(const CellLock&) = delete;
@@ -149,6 +146,14 @@ class RealDevices final : public CellDevices {
   std::vector<std::string> identify_laser() override {
     return laser_ ? laser_->identify() : CellDevices::identify_laser();
   }
+  Laser::Limits laser_device_limits() override {
+    Laser::Limits limits = CellDevices::laser_device_limits();
+    if (!laser_) return limits;
+    const LaserHead::Powers powers = laser_->head().powers();
+    limits.power_min_w = powers.min_w;
+    limits.power_max_w = powers.max_w;
+    return limits;
+  }
 
  private:
   /// The laser's link belongs to its guard, which turns it off whatever happens to this process.
@@ -180,7 +185,11 @@ class RealDevices final : public CellDevices {
 
 std::unique_ptr<CellDevices> make_cell_devices(const CellDescription& description,
                                                const std::filesystem::path& cell_file) {
-  const CellDeviceOptions options = load_cell_devices(cell_file);
+  return make_cell_devices(description, load_cell_devices(cell_file), cell_file);
+}
+
+std::unique_ptr<CellDevices> make_cell_devices(const CellDescription& description, const CellDeviceOptions& options,
+                                               const std::filesystem::path& cell_file) {
   if (options.is_simulated()) return std::make_unique<SimulatedDevices>(description);
   return std::make_unique<RealDevices>(description, options, cell_file);
 }
