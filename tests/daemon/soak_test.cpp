@@ -263,7 +263,7 @@ TEST(SoakTest, JobsFaultsAndClientsLeaveNoTraceInMemoryOrDescriptorsAndCountsAre
   EXPECT_LE(fds_after, fds + 2);
   // A thousand jobs of history are kept in memory, some kilobytes each.
   EXPECT_LE(mb_after, mb + 12);
-  EXPECT_GT(soak.jobs, 10u);
+  EXPECT_GT(soak.jobs, jobs) << "nothing was painted in the time that was looked at";
 }
 
 }  // namespace
