@@ -56,6 +56,20 @@ TEST(TextOutput, ReportSaysWhatAPersonNeeds) {
       "  warning:       texture a.png is missing\n");
 }
 
+TEST(TextOutput, SkippedDotsAreToldWithAmountsAndWhatWouldHelp) {
+  Json report = kReport;
+  report["skipped"] =
+      Json::parse(R"([{"reason":"incidence","count":1234,"text":"tilt past its limit, typically by 2.1"},
+                                      {"reason":"occluded","count":4,"text":"beam blocked"}])");
+  report["suggestion"] = Json::parse(R"({"text":"a post of 90 mm would reach more"})");
+  const std::string text = format_report(report);
+  EXPECT_NE(text.find("  skipped:       1,234 x tilt past its limit, typically by 2.1\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  skipped:       4 x beam blocked\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  suggestion:    a post of 90 mm would reach more\n"), std::string::npos) << text;
+  report["suggestion"] = nullptr;
+  EXPECT_EQ(format_report(report).find("suggestion"), std::string::npos);
+}
+
 TEST(TextOutput, SharesAreNeverRoundedUpToAll) {
   Json report = kReport;
   report["dots"]["placed"] = 1'000'000;

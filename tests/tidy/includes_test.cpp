@@ -20,10 +20,10 @@ struct LibraryRule {
 // What is plain enough for everybody below daemon/: options and nouns of std and Eigen only.
 constexpr const char* kOptionHeaders =
     "sim/wire/(fault_script|cell_phase|endpoints)\\.h|sampling/(sample_options|tone|input_error|check)\\.h|planner/"
-    "(plan_options|cell_description|sha256)\\.h|"
+    "(plan_options|mounting_options|cell_description|sha256)\\.h|"
     "drivers/device_options\\.h";
 constexpr const char* kCellModelHeaders =
-    "planner/(cell_description|exposure_program|program_file|sha256|time_model|plan_options)\\.h";
+    "planner/(cell_description|exposure_program|program_file|sha256|time_model|plan_options|mounting_options)\\.h";
 constexpr const char* kPosix =
     "(unistd|fcntl|poll|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)/[a-z_]+\\.h";
 
