@@ -44,7 +44,8 @@ const LibraryRule kRules[]{
     {"config", "config/.*", "config/.*", "nlohmann/.*|Eigen/.*"},
     // The light half of daemon/: starts in milliseconds, never sees a mesh or an image.
     {"light programs",
-     "daemon/(server|commands)/.*|daemon/(executor|journal|journal_storage|duration_histogram|program_limits|hilbrush_main|"
+     "daemon/(server|commands)/.*|daemon/"
+     "(executor|journal|journal_storage|duration_histogram|program_limits|hilbrush_main|"
      "hilbrushd_main)\\.(h|cpp)",
      "daemon/(server|commands)/.*|daemon/(executor|journal|journal_storage|duration_histogram|program_limits)\\.h|"
      "config/.*|drivers/.*|sim/devices/.*",
