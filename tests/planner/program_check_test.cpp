@@ -8,6 +8,8 @@
 #include <string>
 
 #include "planner/kinematics.h"
+#include "planner/time_model.h"
+#include "planner/transit.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
@@ -24,7 +26,7 @@ struct Work {
 
   Work() { plan.program.provenance = made_from; }
   std::vector<ProgramFault> check() const {
-    return check_program(plan.program, plan.skipped, dots, mesh, cell, options, 20, {}, &made_from);
+    return check_program(plan.program, plan.skipped, dots, mesh, cell, options, 1000, {}, &made_from);
   }
   Exposure& exposure(std::size_t i) { return plan.program.exposures[i]; }
   /// An exposure that the one before leads to directly.
@@ -177,9 +179,18 @@ const Spoiling kSpoilings[] = {
        via.joints[kJ3] = std::max(via.joints[kJ3], 0.);
        w.add_via(i, via.joints);
      }},
-    {"RetractsRemoved", "on the way there",
+    {"ScreenOnTheWay", "on the way there the lens body touches",
      [](Work& w) {
-       // Every re-pose goes straight through the air - and, sooner or later, through the ball.
+       // Where the lens is half way from home to the next way-point or dot.
+       const auto vias = w.plan.program.vias_before(0);
+       const Joints from = vias[0].joints, to = vias.size() > 1 ? vias[1].joints : w.exposure(0).joints;
+       const Joints there = joints_during(w.cell, from, to, .5 * move_s(w.cell, from, to));
+       const ToolPose tool = Kinematics(w.cell).tool_pose(there);
+       w.add_screen(tool.beam_O, tool.focus_O - .5 * (w.cell.lens.near_m + w.cell.lens.far_m) * tool.beam_O);
+     }},
+    {"RetractsRemoved", "without a retract",
+     [](Work& w) {
+       // Every re-pose goes straight there.
        std::erase_if(w.plan.program.vias, [&](const Via& via) {
          return via.before_exposure > 0 && via.before_exposure < w.plan.program.exposures.size();
        });
