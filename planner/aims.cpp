@@ -273,13 +273,13 @@ bool AimedDots::is_clear(const Target& target, const Eigen::Vector3d& beam_O) co
 AimCosts aim_costs(const PlanOptions& options) {
   switch (options.planning) {
     case Planning::kFast:
-      return {.incidence_s = .001, .aim_s = .6, .switch_s = .02, .spacing = 7 * kDegree, .sample = 1500, .kicks = 0};
+      return {.incidence_s = .001, .aim_s = .6, .switch_s = .02, .spacing = 7 * kDegree, .sample = 1500, .kicks = 2};
     case Planning::kBalanced:
-      return {.incidence_s = .008, .aim_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000, .kicks = 1};
+      return {.incidence_s = .008, .aim_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000, .kicks = 2};
     case Planning::kQuality:
       break;
   }
-  return {.incidence_s = .06, .aim_s = .6, .switch_s = .02, .spacing = 4 * kDegree, .sample = 6000, .kicks = 4};
+  return {.incidence_s = .06, .aim_s = .6, .switch_s = .02, .spacing = 4 * kDegree, .sample = 6000, .kicks = 2};
 }
 
 Aims choose_aims(const AimedDots& dots, const AimCosts& costs, const Progress& progress) {

@@ -14,8 +14,8 @@
 #include "sampling/textured_mesh.h"
 
 /// Dots to program, the entry of planner/:
-///   reach (which beam directions hit the dot, or why none) -> pose_search (one pose a dot, holding the table) ->
-///   time_model -> dose -> program.
+///   pose_search (aims, stations, leftovers with reach's reasons, ordering, yaw) or follow_normal (the baseline) ->
+///   program_builder (clear ways between poses: transit; dose) -> time_model.
 namespace hilbrush {
 
 enum class SkipReason : std::uint8_t {

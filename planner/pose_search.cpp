@@ -15,6 +15,7 @@
 namespace hilbrush {
 namespace {
 
+constexpr std::size_t kKicksOfFastPlan = 500'000;
 constexpr std::size_t kToursAtOnce = 16;  // between two words of progress
 
 std::vector<Tour> tours_of(const Aims& aims, std::vector<std::uint32_t>& left) {
@@ -97,7 +98,10 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   const auto tell = [&](double fraction) {
     if (progress) progress(fraction);
   };
-  const AimCosts costs = aim_costs(reach.options);
+  AimCosts costs = aim_costs(reach.options);
+  // The more dots, the nearer to the shortest possible step all of them are, and the sooner a fast plan is wanted.
+  if (reach.options.planning == Planning::kFast)
+    costs.kicks = std::min(costs.kicks, kKicksOfFastPlan / std::max<std::size_t>(1, dot_indices.size()));
   PosedDots posed;
   std::vector<std::uint32_t> left;
   std::vector<Tour> tours = tours_of(choose_aims(aimed, costs, part_of(progress, 0, .4)), left);

@@ -13,8 +13,8 @@ namespace hilbrush {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr std::size_t kAskedDots = 24;  // of a tour, to judge a station by
-constexpr double kMisfitS = .3;         // what a dot costs that the station does not serve
+constexpr std::size_t kAskedDots = 160;  // of a tour, to judge a station by
+constexpr double kMisfitS = .3;          // what a dot costs that the station does not serve
 constexpr int kRounds = 2;
 
 struct Option {
@@ -129,22 +129,13 @@ class StationChoice {
       const auto next = joints_at(reach_, station, dots_.position_O(tour.dots[i + 1]), *joints);
       if (!next) continue;
       ++steps;
-      step_sum_s += smooth_step_s(*joints, *next);
+      step_sum_s += step_s(reach_.cell, *joints, *next);
     }
     if (served == 0) return std::nullopt;
     const auto n = static_cast<double>(count);
-    const double step_s = steps > 0 ? step_sum_s / static_cast<double>(steps) : 0;
-    option.work_s = n * (step_s + kMisfitS * (1 - static_cast<double>(served) / static_cast<double>(asked)));
+    const double mean_step_s = steps > 0 ? step_sum_s / static_cast<double>(steps) : 0;
+    option.work_s = n * (mean_step_s + kMisfitS * (1 - static_cast<double>(served) / static_cast<double>(asked)));
     return option;
-  }
-
-  /// Without the rounding to ticks, so that a few dots say enough.
-  double smooth_step_s(const Joints& a, const Joints& b) const {
-    double slowest_s = 0;
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      slowest_s = std::max(slowest_s, trapezoid_s(std::abs(a[i] - b[i]), reach_.cell.axes[i].speed_max,
-                                                  reach_.cell.axes[i].acceleration_max));
-    return slowest_s + settle_s(reach_.cell, a, b);
   }
 
   /// Between all tours and home (the last row), by their best pairs of options or by the chosen ones.
