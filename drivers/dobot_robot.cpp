@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <utility>
 
 #include "drivers/dobot_gate.h"
 #include "drivers/driver_error.h"
@@ -17,7 +18,7 @@ constexpr double kSilenceMinS = 0.25;     ///< wall: a busy machine may keep the
 constexpr double kEnableS = 20;           ///< cell
 constexpr double kSetpointWindow = 2e-5;  ///< deg, mm: what six decimals and the controller's arithmetic may differ
 constexpr double kRestSpeed = 0.5;        ///< deg/s, mm/s
-constexpr double kStampS = 1e-3;          ///< resolution of the frames' time stamps
+constexpr double kStampMs = 1;            ///< resolution of the frames' time stamps
 constexpr std::size_t kJ3Index = 2;
 constexpr double kBoundsTolerance = 1e-9;
 constexpr double kLongestSettleS = 60;
@@ -275,31 +276,50 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
   is_in_position_ = false;
 }
 
-bool DobotRobot::is_at_target(const DobotFrame& frame) const {
+/// The controller's own account: its profile has ended at the target, nothing turns, nothing is queued.
+bool DobotRobot::is_at_rest(const DobotFrame& frame) const {
   // While the queue times a pulse the controller calls itself running.
   const bool is_busy =
       std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) { return gate.second->is_busy(); });
   if (!is_busy && (frame.mode != DobotMode::kEnabled || frame.is_running)) return false;
   for (std::size_t i = 0; i < target_.size(); ++i)
-    if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) ||
-        !(std::abs(frame.actual[i] - target_[i]) <= window_of(options_, i)) ||
-        !(std::abs(frame.speed[i]) <= kRestSpeed))
+    if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) || !(std::abs(frame.speed[i]) <= kRestSpeed))
       return false;
   return true;
 }
 
-/// Under the lock. True if in_position changed.
-bool DobotRobot::judge_arrival(const DobotFrame& frame) {
+bool DobotRobot::is_within_window(const DobotFrame& frame) const {
+  for (std::size_t i = 0; i < target_.size(); ++i)
+    if (!(std::abs(frame.actual[i] - target_[i]) <= window_of(options_, i))) return false;
+  return true;
+}
+
+/// When the profile ended, between the frame that still shows motion and the one that shows rest: constant deceleration
+/// over what was left takes 2 d / v, and any other profile takes less. Stamps are cut to whole milliseconds, so one is
+/// added: never too early.
+double DobotRobot::rest_begin_ms(const DobotFrame& moving, const DobotFrame& resting) const {
+  double left_s = 0;
+  for (std::size_t i = 0; i < target_.size(); ++i) {
+    const double distance = std::abs(target_[i] - moving.setpoint[i]), speed = std::abs(moving.speed[i]);
+    if (distance > kSetpointWindow) left_s = std::max(left_s, speed > 0 ? 2 * distance / speed : 1.);
+  }
+  const double end_ms = static_cast<double>(moving.time_ms) + left_s * 1e3;
+  return std::min(end_ms, static_cast<double>(resting.time_ms)) + kStampMs;
+}
+
+/// Under the lock. `before`: the frame before this one. True if in_position changed.
+bool DobotRobot::judge_arrival(const DobotFrame& before, const DobotFrame& frame) {
   const bool was_in_position = is_in_position_;
-  if (!is_target_current_ || frame.time_ms <= accepted_ms_ || !is_at_target(frame)) {
+  if (!is_target_current_ || frame.time_ms <= accepted_ms_ || !is_at_rest(frame)) {
     rest_ms_ = -1;
     is_in_position_ = false;
     return was_in_position;
   }
   const double time_ms = static_cast<double>(frame.time_ms);
-  if (rest_ms_ < 0) rest_ms_ = time_ms;
-  // Both stamps may have been rounded; the settle time is never cut short by that.
-  is_in_position_ = settle_s_ <= 0 || time_ms - rest_ms_ >= (settle_s_ + kStampS) * 1e3;
+  const bool is_near = is_within_window(frame);
+  if (rest_ms_ < 0) rest_ms_ = rest_begin_ms(before, frame);
+  if (was_in_position && !is_near) rest_ms_ = time_ms + kStampMs;  // it left its place: settling begins anew
+  is_in_position_ = is_near && (settle_s_ <= 0 || time_ms >= rest_ms_ + settle_s_ * 1e3);
   if (is_in_position_ && !was_in_position) in_position_since_s_ = clock_.now_s();
   return is_in_position_ != was_in_position;
 }
@@ -311,7 +331,7 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     const std::lock_guard lock(mutex_);
     if (frame_count_ > 0 && frame.time_ms == frame_.time_ms) return;  // stale
     ++frame_count_;
-    frame_ = frame;
+    const DobotFrame before = std::exchange(frame_, frame);
     const bool is_on = state_ == DeviceState::kEnabled || state_ == DeviceState::kReady;
     const bool is_alive = is_on || state_ == DeviceState::kConnected;
     if (is_alive && (frame.mode == DobotMode::kError || frame.has_error))
@@ -319,7 +339,7 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     else if (is_on && frame.mode != DobotMode::kEnabled && frame.mode != DobotMode::kRunning)
       is_news = set_fault(std::string("the robot is ") + dobot_mode_name(frame.mode));
     else if (state_ != DeviceState::kFault)
-      is_news = judge_arrival(frame);
+      is_news = judge_arrival(before, frame);
     for (const auto& [output, gate] : gates_)
       if (!gate->agrees_with(frame)) {
         has_failed = true;

@@ -1,6 +1,8 @@
 #include "drivers/guarded_head.h"
 
 #include <poll.h>
+#include <pthread.h>
+#include <sched.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -127,6 +129,10 @@ void GuardedHead::lose(const std::string& sentence) {
 }
 
 void GuardedHead::run() {
+  // Where the system allows it heartbeats come before all ordinary threads: load must not turn the laser off.
+  constexpr int kPriority = 10;
+  const sched_param parameters{kPriority};
+  ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters);
   try {
     Deadline beat = Steady::now(), silence = deadline_in(options_.silence_s);
     for (;;) {

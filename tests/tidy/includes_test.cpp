@@ -25,7 +25,8 @@ constexpr const char* kOptionHeaders =
 constexpr const char* kCellModelHeaders =
     "planner/(cell_description|exposure_program|program_file|sha256|time_model|plan_options|mounting_options)\\.h";
 constexpr const char* kPosix =
-    "(unistd|fcntl|poll|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)/[a-z_]+\\.h";
+    "(unistd|fcntl|poll|netdb|sched|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)/"
+    "[a-z_]+\\.h";
 
 const LibraryRule kRules[]{
     {"sampling_images", "sampling/images/.*", "sampling/[^/]+\\.h|sampling/images/.*",

@@ -58,7 +58,8 @@ TEST_P(LightProgram, LinksNothingHeavy) {
   EXPECT_LE(loaded.size(), 30u) << GetParam() << ": hundreds of libraries take a second to load";
 }
 
-INSTANTIATE_TEST_SUITE_P(Programs, LightProgram, testing::Values("hilbrush", "hilbrushd", "hilbrush-simcell"));
+INSTANTIATE_TEST_SUITE_P(Programs, LightProgram,
+                         testing::Values("hilbrush", "hilbrushd", "hilbrush-laserguard", "hilbrush-simcell"));
 
 TEST(HeavyProgram, IsRecognised) {
   // The same reading finds the image library where it is linked: the test above can fail.
