@@ -1,7 +1,7 @@
 // What the wire costs: a program painted through the real drivers against the device servers of sim/wire, beside the
 // same program on the cell in process; whose time a dot takes; and how long a stop takes until the light is off.
 //
-//   wire_bench                                a generated program of 150 dots, 60 of them in real time, 40 stops
+//   wire_bench [STOPS]                        a generated program of 150 dots, 60 of them in real time, 40 stops
 //   wire_bench MODEL SIZE_MM DPI SCALE REAL STOPS
 //
 // paints MODEL at SCALE wall seconds a cell second, then the first REAL dots of it in real time, then measures STOPS.
@@ -169,7 +169,7 @@ void measure_stops(int stops) {
   std::mt19937 random(1);
   std::vector<double> latencies;
   int lost = 0;
-  for (int i = 0; i < stops; ++i) {
+  for (int i = 0; i < 3 * stops && latencies.size() < static_cast<std::size_t>(stops); ++i) {
     ExecutionControl control;
     world.recover(control, 20);
     const Cell cell = world.cell();
@@ -206,7 +206,7 @@ int main(int argc, char** argv) {
   const bool has_model = argc > 6;
   const double time_scale = has_model ? std::atof(argv[4]) : .05;
   const std::size_t real_dots = has_model ? static_cast<std::size_t>(std::atoi(argv[5])) : 60;
-  const int stops = has_model ? std::atoi(argv[6]) : 40;
+  const int stops = has_model ? std::atoi(argv[6]) : argc > 1 ? std::atoi(argv[1]) : 40;
   const CellDescription description = test::shipped_cell();
   ExposureProgram program =
       has_model ? planned(argv[1], std::atof(argv[2]), std::atof(argv[3])) : test::small_job(description, 150);
