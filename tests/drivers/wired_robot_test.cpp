@@ -1,0 +1,162 @@
+#include <cmath>
+
+#include "tests/drivers/wired_cell.h"
+
+/// The robot's driver and its gate against a simulated controller that misbehaves.
+namespace hilbrush::test {
+namespace {
+
+class WiredRobot : public testing::Test {
+ protected:
+  WiredRobot() {
+    cell.laser->connect();
+    WiredCell::make_ready(*cell.robot);
+    home = cell.robot->status().positions;
+  }
+  Robot::Positions beside(double step) const {
+    Robot::Positions target = home;
+    target[0] += step;
+    return target;
+  }
+  void order(const WireFaultKind kind, double duration_s = 60) {
+    WireFault fault;
+    fault.kind = kind;
+    fault.device = WireDevice::kRobot;
+    fault.trigger.at_s = cell.wire.now_s();
+    fault.duration_s = duration_s;
+    cell.wire.add_fault(fault);
+  }
+  bool is_robot_moving() {
+    bool is_moving = false;
+    cell.wire.act([&](TrueCell& truth) { is_moving = truth.is_moving(kJ1); });
+    return is_moving;
+  }
+
+  WiredCell cell;
+  Robot::Positions home{};
+};
+
+TEST_F(WiredRobot, TakesTargetsAheadAndArrivesAtTheLast) {
+  for (const double step : {.1, .2, .15}) cell.robot->move_to(beside(step), cell.description.timing.settle_max_s);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  EXPECT_NEAR(cell.robot->status().positions[0], home[0] + .15, 1e-5);
+  cell.wire.act([&](TrueCell& truth) { EXPECT_TRUE(truth.is_settled(kJ1)); });
+}
+
+TEST_F(WiredRobot, AStopForgetsWhatWasAhead) {
+  for (const double step : {.5, -.5}) cell.robot->move_to(beside(step), .02);
+  ASSERT_TRUE(cell.wait_for([&] { return is_robot_moving(); }));
+  cell.robot->stop();
+  EXPECT_TRUE(cell.wait_for([&] { return !is_robot_moving(); }, 2));
+  EXPECT_FALSE(cell.robot->status().in_position);
+  cell.robot->move_to(beside(.01), .02);
+  EXPECT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+}
+
+TEST_F(WiredRobot, AStaleReportIsNoArrival) {
+  order(WireFaultKind::kStaleInPosition, 2);
+  cell.robot->move_to(beside(.5), .02);
+  const double begun_s = cell.clock.now_s();
+  while (cell.clock.now_s() < begun_s + 1.5) {
+    if (cell.robot->status().in_position) {
+      EXPECT_FALSE(is_robot_moving());
+    }
+    cell.clock.sleep_until(cell.clock.now_s() + .01);
+  }
+}
+
+TEST_F(WiredRobot, RefusesWhatIsOutsideItsLimits) {
+  EXPECT_THROW(cell.robot->move_to(beside(10), .02), DriverError);
+  EXPECT_THROW(cell.robot->move_to(beside(std::nan("")), .02), DriverError);
+  EXPECT_THROW(cell.robot->move_to(home, -1), DriverError);
+  EXPECT_THROW(cell.robot->move_to(home, std::nan("")), DriverError);
+}
+
+TEST_F(WiredRobot, AnAlarmIsAFaultThatCanBeCleared) {
+  cell.robot->move_to(beside(.5), .02);
+  order(WireFaultKind::kDeviceAlarm);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().state == DeviceState::kFault; }));
+  EXPECT_THROW(cell.robot->move_to(home, .02), DriverError);
+  cell.wire.clear_faults();
+  cell.robot->clear_fault();
+  cell.robot->enable();
+  cell.robot->home();
+  cell.robot->move_to(home, .02);
+  EXPECT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+}
+
+TEST_F(WiredRobot, ALostLinkIsAFaultThatSaysWhatWasSaidLast) {
+  order(WireFaultKind::kDroppedConnection);
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 3; ++i) cell.robot->move_to(beside(.01 * i), .02);
+      },
+      DriverError);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().state == DeviceState::kFault; }));
+  EXPECT_NE(cell.robot->status().fault.find("last messages: "), std::string::npos) << cell.robot->status().fault;
+}
+
+TEST_F(WiredRobot, APulseNeedsARobotInPosition) {
+  Gate& gate = cell.robot->gate(1);
+  cell.robot->move_to(beside(.5), .02);
+  EXPECT_THROW(gate.pulse(.005), DriverError);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  EXPECT_THROW(gate.pulse(.0055), DriverError) << "whole milliseconds only";
+  EXPECT_THROW(gate.pulse(0), DriverError);
+  EXPECT_THROW(gate.pulse(1e9), DriverError);
+  EXPECT_FALSE(gate.is_on());
+}
+
+TEST_F(WiredRobot, OffEndsAPulseAndWhatIsQueuedOfIt) {
+  cell.laser->enable();
+  cell.robot->move_to(beside(.01), .02);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  Gate& gate = cell.robot->gate(1);
+  gate.pulse(5);  // half a second of wall
+  ASSERT_TRUE(cell.wait_for([&] {
+    bool is_lit = false;
+    cell.wire.act([&](TrueCell& truth) { is_lit = truth.is_emitting(); });
+    return is_lit;
+  }));
+  EXPECT_TRUE(gate.off());
+  EXPECT_FALSE(gate.is_on());
+  cell.wire.act([](TrueCell& truth) { EXPECT_FALSE(truth.is_gate_open()); });
+  ASSERT_EQ(cell.emissions().size(), 1u);
+  EXPECT_LT(cell.emissions()[0].length_s, 4);
+  cell.clock.sleep_until(cell.clock.now_s() + 1);
+  EXPECT_EQ(cell.emissions().size(), 1u);
+}
+
+TEST_F(WiredRobot, AnAlarmInAPulseEndsIt) {
+  cell.laser->enable();
+  cell.robot->move_to(beside(.01), .02);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  cell.laser->fire(.05, .05);
+  order(WireFaultKind::kDeviceAlarm);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().state == DeviceState::kFault; }));
+  EXPECT_TRUE(cell.wait_for([&] {
+    bool is_dark = false;
+    cell.wire.act([&](TrueCell& truth) { is_dark = !truth.is_emitting(); });
+    return is_dark;
+  }));
+}
+
+TEST_F(WiredRobot, AnOpenInterlockIsKnownBeforeThePulseCounts) {
+  cell.laser->enable();
+  cell.robot->move_to(beside(.01), .02);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  cell.laser->fire(.05, .05);
+  cell.wire.act([](TrueCell& truth) { truth.set_interlock(false); });
+  ASSERT_TRUE(cell.wait_for([&] { return !cell.laser->status().is_emitting; }));
+  EXPECT_EQ(cell.laser->status().state, DeviceState::kFault);
+  EXPECT_EQ(cell.laser->status().fault, "the interlock was opened");
+  EXPECT_THROW(cell.laser->clear_fault(), DriverError) << "while it is open";
+  cell.wire.act([](TrueCell& truth) { truth.set_interlock(true); });
+  EXPECT_EQ(cell.laser->status().state, DeviceState::kFault) << "closing it brings nothing back";
+  cell.laser->clear_fault();
+  cell.laser->enable();
+  EXPECT_EQ(cell.laser->status().state, DeviceState::kReady);
+}
+
+}  // namespace
+}  // namespace hilbrush::test
