@@ -9,7 +9,7 @@
 #include <random>
 
 #include "planner/mounting.h"
-#include "planner/reach.h"
+#include "planner/reach/reach.h"
 
 namespace hilbrush {
 namespace {

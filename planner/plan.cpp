@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "planner/dose.h"
-#include "planner/follow_normal.h"
-#include "planner/pose_search.h"
-#include "planner/posed_dots.h"
-#include "planner/program_builder.h"
-#include "planner/reach.h"
+#include "planner/poses/follow_normal.h"
+#include "planner/poses/pose_search.h"
+#include "planner/poses/posed_dots.h"
+#include "planner/poses/program_builder.h"
+#include "planner/reach/reach.h"
+#include "planner/reach/transit.h"
 #include "planner/time_model.h"
-#include "planner/transit.h"
 #include "sampling/check.h"
 #include "sampling/input_error.h"
 

@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "planner/check_cell.h"
+#include "planner/check/check_cell.h"
 
 namespace hilbrush {
 namespace {

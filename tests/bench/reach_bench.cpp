@@ -17,15 +17,15 @@
 #include <vector>
 
 #include "config/cell_file.h"
-#include "planner/reach.h"
+#include "planner/reach/reach.h"
 #include "sampling/images/image_file.h"
 #include "sampling/input_error.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"
 #include "sampling/placement.h"
 #include "tests/bench/answer_hash.h"
-#include "tests/planner/pose_grid.h"
-#include "tests/planner/ray_bundle.h"
+#include "tests/planner/reach/pose_grid.h"
+#include "tests/planner/reach/ray_bundle.h"
 
 namespace {
 

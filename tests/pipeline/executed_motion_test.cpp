@@ -3,7 +3,7 @@
 #include "config/cell_file.h"
 #include "daemon/executor.h"
 #include "daemon/pipeline.h"
-#include "planner/check_cell.h"
+#include "planner/check/check_cell.h"
 #include "planner/program_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/mesh_repair.h"

@@ -9,7 +9,7 @@
 
 #include "daemon/executor.h"
 #include "daemon/painted_dots.h"
-#include "planner/check_cell.h"
+#include "planner/check/check_cell.h"
 #include "planner/plan.h"
 #include "planner/program_check.h"
 #include "sampling/input_error.h"

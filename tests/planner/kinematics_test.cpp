@@ -10,8 +10,8 @@
 #include <random>
 #include <string>
 
-#include "planner/check_cell.h"
-#include "planner/reach.h"
+#include "planner/check/check_cell.h"
+#include "planner/reach/reach.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "planner/posed_dots.h"
-#include "planner/reach.h"
+#include "planner/poses/posed_dots.h"
+#include "planner/reach/reach.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

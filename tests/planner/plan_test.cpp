@@ -7,12 +7,12 @@
 #include <cstring>
 #include <numbers>
 
-#include "planner/check_cell.h"
+#include "planner/check/check_cell.h"
 #include "planner/dose.h"
 #include "planner/program_check.h"
-#include "planner/reach.h"
+#include "planner/reach/reach.h"
+#include "planner/reach/transit.h"
 #include "planner/time_model.h"
-#include "planner/transit.h"
 #include "sampling/input_error.h"
 #include "tests/planner/workpieces.h"
 

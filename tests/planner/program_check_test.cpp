@@ -8,8 +8,8 @@
 #include <string>
 
 #include "planner/kinematics.h"
+#include "planner/reach/transit.h"
 #include "planner/time_model.h"
-#include "planner/transit.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

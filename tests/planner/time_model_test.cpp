@@ -6,7 +6,7 @@
 #include <random>
 
 #include "planner/plan.h"
-#include "planner/transit.h"
+#include "planner/reach/transit.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

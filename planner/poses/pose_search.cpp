@@ -1,0 +1,144 @@
+#include "planner/poses/pose_search.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "planner/poses/leftovers.h"
+#include "planner/poses/ordering.h"
+#include "planner/poses/stations.h"
+#include "planner/poses/yaw_slack.h"
+#include "sampling/check.h"
+
+namespace hilbrush {
+namespace {
+
+constexpr std::size_t kKicksOfFastPlan = 500'000;
+constexpr std::size_t kToursAtOnce = 16;  // between two words of progress
+
+std::vector<Tour> tours_of(const Aims& aims, std::vector<std::uint32_t>& left) {
+  std::vector<Tour> tours(aims.beams_O.size());
+  for (std::size_t k = 0; k < tours.size(); ++k) tours[k].beam_O = aims.beams_O[k];
+  for (std::size_t i = 0; i < aims.of_dot.size(); ++i)
+    (aims.of_dot[i] == kNoAim ? left : tours[aims.of_dot[i]].dots).push_back(static_cast<std::uint32_t>(i));
+  std::erase_if(tours, [](const Tour& tour) { return tour.dots.empty(); });
+  return tours;
+}
+
+/// Dots that the tour's station does not serve after all move to `left`.
+void remove_misfits(const AimedDots& dots, std::vector<Tour>& tours, std::vector<std::uint32_t>& left) {
+  std::vector<std::vector<std::uint32_t>> misfits(tours.size());
+  tbb::parallel_for(std::size_t{0}, tours.size(), [&](std::size_t t) {
+    std::erase_if(tours[t].dots, [&](std::uint32_t dot) {
+      if (joints_at(dots.reach(), tours[t].station, dots.position_O(dot), {})) return false;
+      misfits[t].push_back(dot);
+      return true;
+    });
+  });
+  for (const auto& some : misfits) left.insert(left.end(), some.begin(), some.end());
+  std::erase_if(tours, [](const Tour& tour) { return tour.dots.empty(); });
+}
+
+/// C and J4 by the shortest way from the tour before. Returns where the axes stand at the tour's first dot.
+Joints wind(const Reach::Implementation& reach, const Eigen::Vector3d& first_O, const Joints& before,
+            Station& station) {
+  station.rotation = reach.kinematics.wind(kRotation, station.rotation, before[kRotation]);
+  // J4 keeps clear of its ends, so that it need not unwind within the tour.
+  const double middle = (reach.kinematics.axis_min(kJ4) + reach.kinematics.axis_max(kJ4)) / 2;
+  const double half =
+      std::max(std::numbers::pi, (reach.kinematics.axis_max(kJ4) - reach.kinematics.axis_min(kJ4)) / 2 - 1);
+  auto joints = joints_at(reach, station, first_O, before);
+  if (joints && std::abs((*joints)[kJ4] - middle) > half) {
+    Joints reference = *joints;
+    reference[kJ4] -= std::copysign(2 * std::numbers::pi, reference[kJ4] - middle);
+    joints = joints_at(reach, station, first_O, reference);
+  }
+  return joints ? *joints : before;
+}
+
+/// The tour's dots with their joints, in the order in which they are exposed.
+std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, Tour& tour, const Joints& first) {
+  const Reach::Implementation& reach = dots.reach();
+  std::vector<Joints> joints;
+  joints.reserve(tour.dots.size());
+  for (const std::uint32_t dot : tour.dots) {
+    const auto found = joints_at(reach, tour.station, dots.position_O(dot), joints.empty() ? first : joints.back());
+    CHECK(found.has_value());  // misfits have been removed
+    joints.push_back(*found);
+  }
+  if (reach.options.order == DotOrder::kImproved) {
+    std::vector<PathDot> path;
+    path.reserve(joints.size());
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      path.push_back({dots.position_O(tour.dots[i]).cast<float>(), {}});
+      for (std::size_t axis = 0; axis < 4; ++axis) path.back().arm[axis] = static_cast<float>(joints[i][axis]);
+    }
+    const std::vector<std::uint32_t> order = improved_order(reach.cell, path, costs.kicks);
+    const std::vector<Joints> old_joints = joints;
+    const std::vector<std::uint32_t> old_dots = tour.dots;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      joints[i] = old_joints[order[i]];
+      tour.dots[i] = old_dots[order[i]];
+    }
+  }
+  use_yaw_slack(dots, costs, tour.station, tour.dots, joints);
+  std::vector<PosedDot> posed;
+  posed.reserve(joints.size());
+  for (std::size_t i = 0; i < joints.size(); ++i) posed.push_back({dots.dot_index(tour.dots[i]), joints[i]});
+  return posed;
+}
+
+}  // namespace
+
+PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& dots,
+                       std::span<const std::uint32_t> dot_indices, const Progress& progress) {
+  const AimedDots aimed(reach, dots, dot_indices);
+  const auto tell = [&](double fraction) {
+    if (progress) progress(fraction);
+  };
+  AimCosts costs = aim_costs(reach.options);
+  // The more dots, the nearer to the shortest possible step all of them are, and the sooner a fast plan is wanted.
+  if (reach.options.planning == Planning::kFast)
+    costs.kicks = std::min(costs.kicks, kKicksOfFastPlan / std::max<std::size_t>(1, dot_indices.size()));
+  PosedDots posed;
+  std::vector<std::uint32_t> left;
+  std::vector<Tour> tours = tours_of(choose_aims(aimed, costs, part_of(progress, 0, .4)), left);
+  place_stations(aimed, tours, left);
+  remove_misfits(aimed, tours, left);
+  tell(.5);
+  const std::size_t common = tours.size();
+  serve_leftovers(aimed, std::move(left), tours, posed.skipped, part_of(progress, .5, .7));
+  if (tours.size() > common) {
+    std::vector<std::uint32_t> none;
+    place_stations(aimed, tours, none);
+  }
+  tell(.7);
+
+  std::vector<Joints> first(tours.size());
+  Joints before = home_joints(reach.cell);
+  for (std::size_t t = 0; t < tours.size(); ++t)
+    first[t] = before = wind(reach, aimed.position_O(tours[t].dots.front()), before, tours[t].station);
+  std::vector<std::vector<PosedDot>> parts(tours.size());
+  for (std::size_t begin = 0; begin < tours.size(); begin += kToursAtOnce) {
+    const std::size_t end = std::min(tours.size(), begin + kToursAtOnce);
+    tbb::parallel_for(begin, end, [&](std::size_t t) { parts[t] = posed_tour(aimed, costs, tours[t], first[t]); });
+    tell(.7 + .3 * static_cast<double>(end) / static_cast<double>(tours.size()));
+  }
+  posed.sequence.reserve(dot_indices.size());
+  before = home_joints(reach.cell);
+  for (auto& part : parts) {
+    if (part.empty()) continue;
+    // An open path may be walked from either end.
+    if (step_s(reach.cell, before, part.back().joints) < step_s(reach.cell, before, part.front().joints))
+      std::reverse(part.begin(), part.end());
+    posed.sequence.insert(posed.sequence.end(), part.begin(), part.end());
+    before = part.back().joints;
+    part = {};
+  }
+  tell(1);
+  return posed;
+}
+
+}  // namespace hilbrush

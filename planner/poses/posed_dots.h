@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "planner/reach/reach.h"
+#include "sampling/dots.h"
+#include "sampling/progress.h"
+
+/// What pose search hands on: which dots are exposed, in which order, with which joints. How the axes get from one to
+/// the next is the program builder's.
+namespace hilbrush {
+
+struct PosedDot {
+  std::uint32_t dot_index = 0;
+  Joints joints{};
+};
+
+struct PosedDots {
+  std::vector<PosedDot> sequence;
+  std::vector<SkippedDot> skipped;
+};
+
+Target target_of(const Dot& dot);
+Joints home_joints(const CellDescription& cell);
+
+/// Progress within a stage that goes from one fraction of the whole to another.
+Progress part_of(const Progress& progress, double from, double to);
+
+/// Move and settle of a direct move between two exposures.
+double step_s(const CellDescription& cell, const Joints& from, const Joints& to);
+
+}  // namespace hilbrush

@@ -1,0 +1,261 @@
+#include "planner/reach/clearance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace hilbrush {
+namespace {
+
+/// The ray starts this far from the dot: above the rounding of single precision, below any error that could be seen on
+/// the film.
+constexpr double kBeamStartM = 2e-6;
+/// The beam passes edges at this distance at least, except right at the dot, where its own surface is that near.
+constexpr double kBeamRadiusM = 20e-6, kSideBeamStartM = .3e-3;
+/// The beam passes post and plate at this distance at least.
+constexpr double kBeamTableGapM = .3e-3;
+
+/// Distance from a point at (r, z) to a solid cylinder around the z axis.
+double cylinder_distance_m(double r, double z, double radius, double z_low, double z_high) {
+  const double dr = r - radius, dz = std::max(z_low - z, z - z_high);
+  if (dr <= 0 || dz <= 0) return std::max(dr, dz);
+  return std::sqrt(dr * dr + dz * dz);
+}
+
+/// Radius of object and table parts around an axis through the origin; `height` lifts O's origin above it.
+double radius_around(const TexturedMesh& mesh, const CellDescription& cell, double height, bool around_tilt) {
+  const auto along = [&](double r, double z) { return around_tilt ? std::hypot(r, z + height) : r; };
+  const double post = cell.fixture.post_height_m;
+  double radius = std::max(along(cell.table.plate_radius_m, -post),
+                           along(cell.table.plate_radius_m, -post - cell.table.plate_thickness_m));
+  for (const auto& p : mesh.vertices) radius = std::max(radius, along(p.head<2>().norm(), p.z()));
+  return radius;
+}
+
+/// Whether links, somewhere, come near enough to what turns around the tilt axis to be looked at.
+bool links_come_near(const CellDescription& cell, double radius_around_tilt_m, double slack_m) {
+  const double top_m = cell.table.tilt_axis_W.z() + radius_around_tilt_m + slack_m;
+  const auto is_near = [&](const CellDescription::Arm::Link& link) {
+    return link.radius_m > 0 && link.height_m - link.radius_m < top_m;
+  };
+  return is_near(cell.arm.upper_link) || is_near(cell.arm.fore_link);
+}
+
+bool links_come_near_lens(const CellDescription& cell, double slack_m) {
+  const auto& arm = cell.arm;
+  const double top_m = cell.axes[kJ3].max + slack_m + cell.lens.radius_m * std::cos(arm.beam_depression) +
+                       std::max(0., (cell.lens.far_m - arm.flange_to_focus_m) * std::sin(arm.beam_depression));
+  const auto is_near = [&](const CellDescription::Arm::Link& link) {
+    return link.radius_m > 0 && link.height_m - link.radius_m < top_m;
+  };
+  return is_near(arm.upper_link) || is_near(arm.fore_link);
+}
+
+/// Beyond the largest body that is looked up.
+double field_range_m(const CellDescription& cell, bool has_links) {
+  double radius = std::max(cell.lens.radius_m, cell.arm.quill_radius_m);
+  if (has_links) radius = std::max({radius, cell.arm.upper_link.radius_m, cell.arm.fore_link.radius_m});
+  return 1.1 * radius + Clearance::kSlackMaxM;
+}
+
+}  // namespace
+
+Clearance::Clearance(const TexturedMesh& mesh, const CellDescription& cell)
+    : cell_(cell),
+      radius_around_tilt_m_(radius_around(mesh, cell, cell.table.plate_height_m + cell.fixture.post_height_m, true)),
+      radius_around_rotation_m_(radius_around(mesh, cell, 0, false)),
+      links_may_touch_(links_come_near(cell, radius_around_tilt_m_, kSlackMaxM)),
+      links_may_touch_lens_(links_come_near_lens(cell, kSlackMaxM)),
+      rays_(mesh),
+      distance_(mesh, field_range_m(cell, links_may_touch_)) {}
+
+Shortfall Clearance::Slack::shortfall(Obstruction by_object, Obstruction by_table) const {
+  if (least_m() >= kMarginM) return {};
+  return {table_m < object_m ? by_table : by_object, kMarginM - least_m()};
+}
+
+double Clearance::table_distance_m(const Eigen::Vector3d& p_O) const {
+  const double r = p_O.head<2>().norm(), z = p_O.z(), post = cell_.fixture.post_height_m;
+  if (z >= distance_.range_m()) return z;  // nobody asks how much farther it is
+  return std::min(cylinder_distance_m(r, z, cell_.fixture.post_radius_m, -post, 0),
+                  cylinder_distance_m(r, z, cell_.table.plate_radius_m, -post - cell_.table.plate_thickness_m, -post));
+}
+
+Obstruction Clearance::beam_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  // What passes an edge by less than the side rays' distance passes it by rounding alone.
+  const Eigen::Vector3d u = kBeamRadiusM * beam_O.unitOrthogonal(), v = beam_O.cross(u);
+  if (rays_.is_beam_blocked(focus_O, -beam_O, {u, .866 * v - .5 * u, -.866 * v - .5 * u}, kBeamStartM, kSideBeamStartM,
+                            cell_.lens.far_m))
+    return Obstruction::kBeamObject;
+  return table_free_length_m(focus_O, beam_O) < cell_.lens.far_m ? Obstruction::kBeamTable : Obstruction::kNone;
+}
+
+/// From the dot towards the lens in steps of the free distance. A dot that itself is nearer to the post than the gap
+/// only has to get away from it.
+double Clearance::table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  const double far_m = cell_.lens.far_m;
+  if (std::min(focus_O.z(), focus_O.z() - far_m * beam_O.z()) > kBeamTableGapM) return far_m;  // all of it is above
+  double free_m = table_distance_m(focus_O);
+  const double gap_m = std::min(kBeamTableGapM, .9 * free_m);
+  for (double t = 0; t < far_m; t += free_m) {
+    free_m = table_distance_m(focus_O - t * beam_O);
+    if (free_m <= gap_m) return t;
+  }
+  return far_m;
+}
+
+double Clearance::beam_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  return std::min(rays_.free_length_m(focus_O, -beam_O, kBeamStartM, cell_.lens.far_m),
+                  table_free_length_m(focus_O, beam_O));
+}
+
+Clearance::BallRow Clearance::cover(const Eigen::Vector3d& from_O, const Eigen::Vector3d& along_O, double length_m,
+                                    double radius_m, double half_step_m) {
+  const int count = std::max(1, static_cast<int>(std::ceil(length_m / (2 * half_step_m))));
+  const double slice_m = length_m / count;
+  return {from_O + .5 * slice_m * along_O,
+          slice_m * along_O,
+          count,
+          std::sqrt(radius_m * radius_m + .25 * slice_m * slice_m),
+          slice_m,
+          radius_m};
+}
+
+Clearance::BallRow Clearance::lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
+                                       double half_step_m, double from_m) const {
+  return cover(focus_O - from_m * beam_O, -beam_O, cell_.lens.far_m - from_m, cell_.lens.radius_m, half_step_m);
+}
+
+Clearance::BallRow Clearance::quill_row(const ToolPose& tool) const {
+  const double radius_m = std::max(cell_.arm.quill_radius_m, 1e-3);
+  return cover(tool.focus_O - cell_.arm.flange_to_focus_m * tool.beam_O, tool.up_O, cell_.arm.quill_length_m, radius_m,
+               .4 * radius_m);
+}
+
+bool Clearance::keeps_margin(const BallRow& row) const {
+  const double error_m = distance_.error_m(row.ball_m);
+  for (int i = 0; i < row.count;) {
+    const Eigen::Vector3d p_O = row.first_O + i * row.step_O;
+    const double free_m = std::min(distance_(p_O) - error_m, table_distance_m(p_O)) - kMarginM;
+    if (free_m < row.ball_m) return false;
+    // A free ball covers the cylinder as far as its chord reaches: that many slices need no look of their own.
+    const double chord_m = std::sqrt(free_m * free_m - row.cylinder_m * row.cylinder_m);
+    i += std::max(1, 1 + static_cast<int>(std::floor((chord_m - .5 * row.slice_m) / row.slice_m)));
+  }
+  return true;
+}
+
+void Clearance::lessen(const Eigen::Vector3d& ball_O, double radius_m, Slack& slack) const {
+  slack.object_m = std::min(slack.object_m, distance_(ball_O) - radius_m - distance_.error_m(radius_m));
+  slack.table_m = std::min(slack.table_m, table_distance_m(ball_O) - radius_m);
+}
+
+void Clearance::lessen(const BallRow& row, Slack& slack) const {
+  for (int i = 0; i < row.count; ++i) lessen(row.first_O + i * row.step_O, row.ball_m, slack);
+}
+
+Clearance::Slack Clearance::lens_slack(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  Slack slack;
+  lessen(lens_row(focus_O, beam_O, cell_.lens.radius_m / 3, cell_.lens.near_m), slack);
+  return slack;
+}
+
+/// Small balls at the near end instead of a bulge, and thinner slices.
+Clearance::Slack Clearance::lens_slack_fine(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  Slack slack;
+  const auto& lens = cell_.lens;
+  // 19 balls of .4 radius in two rings cover the end disc and the slice of .4 radius behind it: .2 above and below
+  // their centres they still are discs of .346 radius, and 19 discs of .275 radius would do.
+  const double ball_m = .4 * lens.radius_m, depth_m = .2 * lens.radius_m;
+  const double front_m = lens.near_m + depth_m;
+  const Eigen::Vector3d u = beam_O.unitOrthogonal(), v = beam_O.cross(u);
+  for (int layer = 0; layer < 2; ++layer) {
+    const Eigen::Vector3d center = focus_O - (front_m + layer * 2 * depth_m) * beam_O;
+    lessen(center, ball_m, slack);
+    for (const auto& [count, ring] : {std::pair{6, .50}, std::pair{12, .83}})
+      for (int i = 0; i < count; ++i) {
+        const double angle = 2 * std::numbers::pi * i / count;
+        lessen(center + ring * lens.radius_m * (std::cos(angle) * u + std::sin(angle) * v), ball_m, slack);
+      }
+  }
+  const double behind_m = lens.near_m + 4 * depth_m;
+  if (behind_m < lens.far_m) lessen(lens_row(focus_O, beam_O, lens.radius_m / 6, behind_m), slack);
+  return slack;
+}
+
+Clearance::Slack Clearance::quill_slack(const ToolPose& tool) const {
+  Slack slack;
+  lessen(quill_row(tool), slack);
+  return slack;
+}
+
+Clearance::Slack Clearance::links_slack(const TablePose& table, const Joints& joints) const {
+  Slack slack;
+  if (!links_may_touch_) return slack;
+  for (const Capsule& link_W : arm_links_W(cell_.arm, joints)) {
+    if (link_W.radius_m <= 0) continue;
+    const Capsule link = link_W.in_O(table);
+    const double length_m = (link.to - link.from).norm();
+    lessen(cover(link.from, (link.to - link.from) / length_m, length_m, link.radius_m, .3 * link.radius_m), slack);
+  }
+  return slack;
+}
+
+double Clearance::link_lens_gap_m(const Joints& joints) const {
+  double gap_m = kSlackMaxM;
+  if (!links_may_touch_lens_) return gap_m;
+  const Capsule lens = lens_capsule_W(cell_, joints);
+  for (const Capsule& link : arm_links_W(cell_.arm, joints))
+    if (link.radius_m > 0) gap_m = std::min(gap_m, capsule_gap_m(link, lens));
+  return gap_m;
+}
+
+Obstruction Clearance::lens_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  if (keeps_margin(lens_row(focus_O, beam_O, cell_.lens.radius_m / 3, cell_.lens.near_m))) return Obstruction::kNone;
+  return lens_shortfall(focus_O, beam_O).what;
+}
+
+Obstruction Clearance::quill_obstruction(const ToolPose& tool) const {
+  return keeps_margin(quill_row(tool)) ? Obstruction::kNone : quill_shortfall(tool).what;
+}
+
+Obstruction Clearance::links_obstruction(const TablePose& table, const Joints& joints) const {
+  return links_may_touch_ || links_may_touch_lens_ ? links_shortfall(table, joints).what : Obstruction::kNone;
+}
+
+Obstruction Clearance::body_obstruction(const ToolPose& tool) const {
+  const Obstruction lens = lens_obstruction(tool.focus_O, tool.beam_O);
+  return lens == Obstruction::kNone ? quill_obstruction(tool) : lens;
+}
+
+Shortfall Clearance::lens_shortfall(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+  return lens_slack_fine(focus_O, beam_O).shortfall(Obstruction::kLensObject, Obstruction::kLensTable);
+}
+
+Shortfall Clearance::quill_shortfall(const ToolPose& tool) const {
+  return quill_slack(tool).shortfall(Obstruction::kQuillObject, Obstruction::kQuillTable);
+}
+
+Shortfall Clearance::links_shortfall(const TablePose& table, const Joints& joints) const {
+  const Shortfall outer = links_slack(table, joints).shortfall(Obstruction::kLinkObject, Obstruction::kLinkTable);
+  const double gap_m = link_lens_gap_m(joints);
+  if (kMarginM - gap_m > outer.amount_m) return {Obstruction::kLinkLens, kMarginM - gap_m};
+  return outer;
+}
+
+double Clearance::slack_m(const ToolPose& tool) const {
+  const double quill_m = quill_slack(tool).least_m();
+  double lens_m = lens_slack(tool.focus_O, tool.beam_O).least_m();
+  if (lens_m < kMarginM) lens_m = std::max(lens_m, lens_slack_fine(tool.focus_O, tool.beam_O).least_m());
+  return std::min(quill_m, lens_m);
+}
+
+double Clearance::slack_m(const Kinematics& kinematics, const Joints& joints) const {
+  const double tool_m = slack_m(kinematics.tool_pose(joints));
+  if (!links_may_touch_ && !links_may_touch_lens_) return tool_m;
+  const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
+  return std::min({tool_m, links_slack(table, joints).least_m(), link_lens_gap_m(joints)});
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,107 @@
+#include "planner/reach/transit.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+
+#include "planner/check/check_cell.h"
+#include "planner/poses/posed_dots.h"
+#include "planner/time_model.h"
+#include "tests/planner/workpieces.h"
+
+namespace hilbrush {
+namespace {
+
+/// Looks at every hundredth of every leg.
+void expect_clear(const CheckCell& check, const CellDescription& cell, const std::vector<Joints>& way,
+                  const std::string& what) {
+  for (std::size_t leg = 1; leg < way.size(); ++leg)
+    for (double t = 0; t <= 1; t += .01) {
+      const Joints at = joints_during(cell, way[leg - 1], way[leg], t * move_s(cell, way[leg - 1], way[leg]));
+      ASSERT_EQ(check.body_fault(at), "") << what << ", leg " << leg;
+    }
+}
+
+/// A cell whose forearm is so low that it has to go round the object.
+CellDescription low_cell() {
+  CellDescription cell = default_cell();
+  cell.arm.fore_link = {.height_m = .27, .radius_m = .02};
+  cell.arm.upper_link = {.height_m = .3, .radius_m = .02};
+  cell.arm.quill_length_m = .3;
+  cell.axes[kJ3].max = .2;
+  cell.axes[kJ3].home = .19;
+  return cell;
+}
+
+TEST(Transit, WaysBetweenRandomPosesAreClear) {
+  constexpr unsigned kSeed = 51;
+  for (const CellDescription& cell : {default_cell(), low_cell()}) {
+    const TexturedMesh mesh = ball(.03);
+    const Reach::Implementation reach(mesh, cell, {});
+    const Transit transit(reach);
+    const CheckCell check(mesh, cell);
+    const DotSequence dots = scatter(mesh, 3e-3, kSeed);
+    std::mt19937 random(kSeed);
+    Joints now = home_of(cell);
+    std::size_t found = 0, tried = 0;
+    for (int n = 0; n < 40; ++n) {
+      const auto pose = reach.find_pose(target_of(dots.dots[random() % dots.dots.size()]), now);
+      if (!pose) continue;
+      ++tried;
+      const auto way = transit.route_by_search(now, pose->joints);
+      if (!way) continue;
+      ++found;
+      std::vector<Joints> whole{now};
+      whole.insert(whole.end(), way->begin(), way->end());
+      whole.push_back(pose->joints);
+      expect_clear(check, cell, whole, "way " + std::to_string(n) + ", seed " + std::to_string(kSeed));
+      now = pose->joints;
+    }
+    EXPECT_GE(found, tried * 9 / 10);
+    EXPECT_GT(tried, 10U);
+  }
+}
+
+TEST(Transit, TheSearchFindsWhatSimpleWaysMiss) {
+  const CellDescription cell = low_cell();
+  const TexturedMesh mesh = ball(.03);
+  const Reach::Implementation reach(mesh, cell, {});
+  const Transit transit(reach);
+  const DotSequence dots = scatter(mesh, 3e-3);
+  std::size_t simple = 0, searched = 0;
+  for (std::size_t i = 0; i < dots.dots.size(); i += 29) {
+    const auto pose = reach.find_pose(target_of(dots.dots[i]), home_of(cell));
+    if (!pose) continue;
+    simple += transit.route(home_of(cell), pose->joints).has_value();
+    searched += transit.route_by_search(home_of(cell), pose->joints).has_value();
+  }
+  EXPECT_GE(searched, simple);
+  EXPECT_GT(searched, 5U);
+}
+
+TEST(Transit, SameWayEachTime) {
+  const CellDescription cell = low_cell();
+  const TexturedMesh mesh = ball(.03);
+  const Reach::Implementation reach(mesh, cell, {});
+  const auto pose = reach.find_pose({{.03, 0, .03}, {1, 0, 0}, {1, 0, 0}}, home_of(cell));
+  ASSERT_TRUE(pose);
+  EXPECT_EQ(Transit(reach).route_by_search(home_of(cell), pose->joints),
+            Transit(reach).route_by_search(home_of(cell), pose->joints));
+}
+
+TEST(Transit, NoWayLeadsIntoTheObject) {
+  const CellDescription cell = default_cell();
+  const TexturedMesh mesh = ball(.03);
+  const Reach::Implementation reach(mesh, cell, {});
+  const Transit transit(reach);
+  Joints inside = home_of(cell);
+  const TablePose table = reach.kinematics.table_pose(0, 0);
+  ASSERT_TRUE(reach.kinematics.solve_arm(table.to_W({.07, 0, -.04}), 0, Elbow::kPositive, inside));
+  EXPECT_FALSE(transit.is_clear_at(inside));
+  EXPECT_FALSE(transit.route_by_search(home_of(cell), inside));
+  EXPECT_FALSE(transit.is_clear(home_of(cell), inside));
+}
+
+}  // namespace
+}  // namespace hilbrush
