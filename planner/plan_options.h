@@ -6,7 +6,7 @@ namespace hilbrush {
 
 /// What a plan is to be good at. Names in settings: "quality", "balanced", "fast".
 enum class Planning {
-  kQuality,   ///< beams nearest to the normals, for about a tenth more painting time
+  kQuality,   ///< beams nearest to the normals, for a few per cent more painting time
   kBalanced,  ///< default
   kFast       ///< the shortest painting time within the preferred incidence, and the least planning time
 };
