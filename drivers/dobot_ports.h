@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
 #include "drivers/dobot_codec.h"
 #include "drivers/link.h"
@@ -74,7 +75,7 @@ class DobotPorts {
   const double feedback_silence_s_;  ///< wall
   Listener listener_;
 
-  std::timed_mutex dashboard_mutex_;
+  DeadlineMutex dashboard_mutex_;
   std::unique_ptr<Link> dashboard_;
 
   std::unique_ptr<Link> motion_, feedback_;

@@ -11,6 +11,7 @@
 #include "drivers/axis_drive.h"
 #include "drivers/axis_group.h"
 #include "drivers/clock.h"
+#include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
 
 namespace hilbrush {
@@ -67,7 +68,7 @@ class DriveGroup final : public AxisGroup<N> {
   const std::array<std::unique_ptr<AxisDrive>, N> drives_;
   Clock& clock_;
 
-  std::timed_mutex command_mutex_;     ///< held through a handshake with a drive
+  DeadlineMutex command_mutex_;        ///< held through a handshake with a drive
   std::atomic<int> stops_waiting_{0};  ///< handshakes end early while not 0
 
   std::mutex mutex_;  ///< of what follows; never held while waiting for a drive

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "drivers/clock.h"
+#include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
 #include "drivers/laser_head.h"
 #include "drivers/link.h"
@@ -80,7 +81,7 @@ class LineLaser : public LaserHead {
   Clock& clock_;
   std::function<void()> on_change_;
 
-  std::timed_mutex exchange_mutex_;
+  DeadlineMutex exchange_mutex_;
   Deadline next_exchange_{};
   LineReader lines_;
   std::mutex write_mutex_;      ///< of the link's writing half; held for a write only

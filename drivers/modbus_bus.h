@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
 #include "drivers/link.h"
 
@@ -43,7 +44,7 @@ class ModbusBus {
   const ModbusEndpoint endpoint_;
   const double reply_s_;
   const std::string name_;
-  std::timed_mutex mutex_;
+  DeadlineMutex mutex_;
   _modbus* context_ = nullptr;
   std::atomic<bool> is_open_{false};
   MessageRing messages_;
