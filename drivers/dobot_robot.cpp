@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
-#include <utility>
 
 #include "drivers/dobot_gate.h"
 #include "drivers/driver_error.h"
@@ -294,21 +293,9 @@ bool DobotRobot::is_within_window(const DobotFrame& frame) const {
   return true;
 }
 
-/// When the profile ended, between the frame that still shows motion and the one that shows rest: constant deceleration
-/// over what was left takes 2 d / v, and any other profile takes less. Stamps are cut to whole milliseconds, so one is
-/// added: never too early.
-double DobotRobot::rest_begin_ms(const DobotFrame& moving, const DobotFrame& resting) const {
-  double left_s = 0;
-  for (std::size_t i = 0; i < target_.size(); ++i) {
-    const double distance = std::abs(target_[i] - moving.setpoint[i]), speed = std::abs(moving.speed[i]);
-    if (distance > kSetpointWindow) left_s = std::max(left_s, speed > 0 ? 2 * distance / speed : 1.);
-  }
-  const double end_ms = static_cast<double>(moving.time_ms) + left_s * 1e3;
-  return std::min(end_ms, static_cast<double>(resting.time_ms)) + kStampMs;
-}
-
-/// Under the lock. `before`: the frame before this one. True if in_position changed.
-bool DobotRobot::judge_arrival(const DobotFrame& before, const DobotFrame& frame) {
+/// Under the lock. True if in_position changed. Settling is counted from the first frame that shows rest, although the
+/// profile ended up to a frame earlier: what happened between two frames is not known, and a pulse must not be early.
+bool DobotRobot::judge_arrival(const DobotFrame& frame) {
   const bool was_in_position = is_in_position_;
   if (!is_target_current_ || frame.time_ms <= accepted_ms_ || !is_at_rest(frame)) {
     rest_ms_ = -1;
@@ -317,7 +304,8 @@ bool DobotRobot::judge_arrival(const DobotFrame& before, const DobotFrame& frame
   }
   const double time_ms = static_cast<double>(frame.time_ms);
   const bool is_near = is_within_window(frame);
-  if (rest_ms_ < 0) rest_ms_ = rest_begin_ms(before, frame);
+  // Stamps are cut to whole milliseconds: one is added, so that the settle time is never cut short.
+  if (rest_ms_ < 0) rest_ms_ = time_ms + kStampMs;
   if (was_in_position && !is_near) rest_ms_ = time_ms + kStampMs;  // it left its place: settling begins anew
   is_in_position_ = is_near && (settle_s_ <= 0 || time_ms >= rest_ms_ + settle_s_ * 1e3);
   if (is_in_position_ && !was_in_position) in_position_since_s_ = clock_.now_s();
@@ -331,7 +319,7 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     const std::lock_guard lock(mutex_);
     if (frame_count_ > 0 && frame.time_ms == frame_.time_ms) return;  // stale
     ++frame_count_;
-    const DobotFrame before = std::exchange(frame_, frame);
+    frame_ = frame;
     const bool is_on = state_ == DeviceState::kEnabled || state_ == DeviceState::kReady;
     const bool is_alive = is_on || state_ == DeviceState::kConnected;
     if (is_alive && (frame.mode == DobotMode::kError || frame.has_error))
@@ -339,7 +327,7 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     else if (is_on && frame.mode != DobotMode::kEnabled && frame.mode != DobotMode::kRunning)
       is_news = set_fault(std::string("the robot is ") + dobot_mode_name(frame.mode));
     else if (state_ != DeviceState::kFault)
-      is_news = judge_arrival(before, frame);
+      is_news = judge_arrival(frame);
     for (const auto& [output, gate] : gates_)
       if (!gate->agrees_with(frame)) {
         has_failed = true;

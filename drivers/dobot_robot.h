@@ -50,10 +50,9 @@ class DobotRobot final : public Robot {
 
   double silence_s() const;
   void take_frame(const DobotFrame& frame);
-  bool judge_arrival(const DobotFrame& before, const DobotFrame& frame);
+  bool judge_arrival(const DobotFrame& frame);
   bool is_at_rest(const DobotFrame& frame) const;
   bool is_within_window(const DobotFrame& frame) const;
-  double rest_begin_ms(const DobotFrame& moving, const DobotFrame& resting) const;
   void fail(const std::string& sentence);
   void shut_gates() noexcept;
   void shut_pulses() noexcept;
