@@ -58,7 +58,8 @@ struct CellDescription {
     double flange_to_focus_m = 0;
     double quill_radius_m = 0;  ///< the vertical shaft above the flange
     double quill_length_m = .25;
-    struct Link {  ///< a capsule around the horizontal line between the axes of two joints
+    /// A capsule around the horizontal line between the axes of two joints.
+    struct Link {
       double height_m = 0;  ///< of that line, in W
       double radius_m = 0;  ///< 0: no link
     } upper_link, fore_link;
