@@ -156,7 +156,7 @@ TEST(ServerFuzzTest, TheCorpusIsAnsweredAndTheDaemonGoesOn) {
   world.begin();
   std::size_t files = 0;
   for (const auto& entry :
-       std::filesystem::directory_iterator(std::string(HILBRUSH_SOURCE_DIR) + "/tests/daemon/corpus/rpc")) {
+       std::filesystem::directory_iterator(std::string(HILBRUSH_SOURCE_DIR) + "/tests/fuzz/corpus/rpc")) {
     SCOPED_TRACE(entry.path().string());
     std::ifstream in(entry.path(), std::ios::binary);
     LineClient client(world.options.socket);

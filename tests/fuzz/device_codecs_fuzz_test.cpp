@@ -30,7 +30,7 @@ std::uint64_t number_from_environment(const char* name, std::uint64_t otherwise)
 std::vector<std::string> corpus() {
   std::vector<std::filesystem::path> files;
   for (const auto& entry :
-       std::filesystem::directory_iterator(std::string(HILBRUSH_SOURCE_DIR) + "/tests/fuzz/corpus_devices"))
+       std::filesystem::directory_iterator(std::string(HILBRUSH_SOURCE_DIR) + "/tests/fuzz/corpus/devices"))
     files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::vector<std::string> inputs;
