@@ -115,7 +115,8 @@ std::string DobotPorts::dashboard(const std::string& command, double wall_s) {
   return reply.values;
 }
 
-void DobotPorts::motion(const std::string* commands, std::size_t count, std::size_t later_count, OnReply on_later) {
+void DobotPorts::motion(const std::string* commands, std::size_t count, std::size_t later_count,
+                        const OnReply& on_later) {
   std::string bytes;
   {
     const std::lock_guard lock(mutex_);

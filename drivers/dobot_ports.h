@@ -52,7 +52,8 @@ class DobotPorts {
   using OnReply = std::function<void(const DobotReply*)>;
   /// Queues commands in one write and waits until all but `later_count` of them are answered; `on_later` gets the last
   /// one's answer. One thread. @throws LinkError; DriverError if one is refused.
-  void motion(const std::string* commands, std::size_t count, std::size_t later_count = 0, OnReply on_later = {});
+  void motion(const std::string* commands, std::size_t count, std::size_t later_count = 0,
+              const OnReply& on_later = {});
   /// The queue was cleared: answers that are still owed may never come.
   void forget_owed();
 
