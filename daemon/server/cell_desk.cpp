@@ -97,33 +97,31 @@ void CellDesk::note_executor_at_rest() {
   begin_clear(*std::exchange(waiting_clear_, std::nullopt));
 }
 
+CellThread::Done CellDesk::end_of_act(Reply reply, State reached, const char* overtaken) {
+  return [this, reply = std::move(reply), reached, overtaken, stops = stops_](const std::optional<CellFault>& fault) {
+    if (stops != stops_) return reply.fault({kRpcWrongState, overtaken, ""});
+    finish_act(reply, reached, fault);
+  };
+}
+
 void CellDesk::begin_clear(Reply reply) {
   thread_.release_stop();
   state_ = State::kClearing;
-  thread_.clear([this, reply = std::move(reply), stops = stops_](const std::optional<CellFault>& fault) {
-    if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped again while it was cleared", ""});
-    finish_act(reply, State::kIdle, fault);
-  });
+  thread_.clear(end_of_act(std::move(reply), State::kIdle, "the cell was stopped again while it was cleared"));
 }
 
 void CellDesk::arm(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
   if (state_ != State::kIdle) refuse("it can be armed only when idle");
   state_ = State::kArming;
-  thread_.arm([this, reply = std::move(reply), stops = stops_](const std::optional<CellFault>& fault) {
-    if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped while it was armed", ""});
-    finish_act(reply, State::kArmed, fault);
-  });
+  thread_.arm(end_of_act(std::move(reply), State::kArmed, "the cell was stopped while it was armed"));
 }
 
 void CellDesk::home(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
   if (state_ != State::kIdle && state_ != State::kArmed) refuse("it can be homed only when idle or armed");
   const State before = std::exchange(state_, State::kHoming);
-  thread_.home([this, reply = std::move(reply), before, stops = stops_](const std::optional<CellFault>& fault) {
-    if (stops != stops_) return reply.fault({kRpcWrongState, "the cell was stopped on its way home", ""});
-    finish_act(reply, before, fault);
-  });
+  thread_.home(end_of_act(std::move(reply), before, "the cell was stopped on its way home"));
 }
 
 /// A device that fails stops the cell: the operator looks, then clears.

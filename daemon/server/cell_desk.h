@@ -54,6 +54,9 @@ class CellDesk {
 
  private:
   void begin_clear(Reply reply);
+  /// What answers `reply` when the act that is ordered now has ended: with the state that it `reached`, or, if a stop
+  /// came between, with the sentence `overtaken`.
+  CellThread::Done end_of_act(Reply reply, State reached, const char* overtaken);
   void finish_act(const Reply& reply, State reached, const std::optional<CellFault>& fault);
   [[noreturn]] void refuse(const std::string& act) const;
 

@@ -15,25 +15,11 @@
 #include "drivers/mapped_drive.h"
 #include "drivers/oriental_az.h"
 #include "drivers/steady_clock.h"
+#include "sim/devices/emission_keeper.h"
 #include "sim/devices/sim_cell.h"
 
 namespace hilbrush {
 namespace {
-
-/// Where simulated emissions go.
-class EmissionKeeper {
- public:
-  void record(SimCell& sim, const std::filesystem::path& file) {
-    sim.set_emission_sink({});
-    record_.reset();
-    if (file.empty()) return;
-    record_ = std::make_unique<EmissionRecordFile>(file);
-    sim.set_emission_sink([this](const Emission& emission) { record_->append(emission); });
-  }
-
- private:
-  std::unique_ptr<EmissionRecordFile> record_;
-};
 
 class SimulatedDevices final : public CellDevices {
  public:

@@ -50,18 +50,6 @@ ExposureProgram planned(const std::string& model, double size_mm, double dpi) {
   return read_program(folder.path() / "program.ply");
 }
 
-std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description) {
-  description.simulation.time_scale = 0;
-  SimCell sim(description);
-  std::vector<Emission> emissions;
-  sim.set_emission_sink([&](const Emission& emission) { emissions.push_back(emission); });
-  bring_up(sim.cell());
-  Journal journal = Journal::in_memory(program.exposures.size());
-  ExecutionControl control;
-  execute(program, {}, sim.cell(), description, journal, control);
-  return emissions;
-}
-
 /// Paints on the wire and prints whose time it took.
 std::vector<Emission> painted_on_wire(const ExposureProgram& program, double time_scale) {
   WiredWorld world(WiredWorld::quick(time_scale));

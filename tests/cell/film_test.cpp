@@ -16,20 +16,8 @@
 namespace hilbrush {
 namespace {
 
+using test::painted_in_process;
 using test::WiredWorld;
-
-std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description) {
-  description.simulation.time_scale = 0;
-  SimCell sim(description);
-  std::vector<Emission> emissions;
-  sim.set_emission_sink([&](const Emission& emission) { emissions.push_back(emission); });
-  bring_up(sim.cell());
-  Journal journal = Journal::in_memory(program.exposures.size());
-  ExecutionControl control;
-  const auto result = execute(program, {}, sim.cell(), description, journal, control);
-  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
-  return emissions;
-}
 
 std::vector<Emission> painted_on_wire(const ExposureProgram& program) {
   WiredWorld world(WiredWorld::quick(.02));

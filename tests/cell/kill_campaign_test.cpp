@@ -1,7 +1,4 @@
 #include <gtest/gtest.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <csignal>
@@ -13,9 +10,7 @@
 #include "planner/program_file.h"
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"
-#include "tests/daemon/daemon_fixture.h"
-
-extern char** environ;
+#include "tests/daemon/daemon_process.h"
 
 /// hilbrushd killed with SIGKILL at random moments of a job over the wire, begun again, and the job resumed: by the
 /// emissions' record no dot is lit twice, none is lost, and each kill leaves at most one in doubt. HILBRUSH_LONG: 200
@@ -23,56 +18,16 @@ extern char** environ;
 namespace hilbrush {
 namespace {
 
+using test::connect;
+using test::DaemonProcess;
 using test::DaemonWorld;
 using test::Json;
 using test::LineClient;
-
-class KilledDaemon {
- public:
-  explicit KilledDaemon(const DaemonOptions& options) {
-    std::vector<std::string> arguments{std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd",
-                                       "--socket",
-                                       options.socket.string(),
-                                       "--state",
-                                       options.state.string(),
-                                       "--cell",
-                                       options.cell,
-                                       "--pipeline",
-                                       options.pipeline.string(),
-                                       "--log-level",
-                                       "off"};
-    std::vector<char*> argv;
-    for (auto& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    EXPECT_EQ(::posix_spawn(&pid_, argv[0], nullptr, nullptr, argv.data(), environ), 0);
-  }
-  ~KilledDaemon() { kill(); }
-  KilledDaemon(const KilledDaemon&) = delete;
-  KilledDaemon& operator=(const KilledDaemon&) = delete;
-  void kill() {
-    if (pid_ <= 0) return;
-    ::kill(pid_, SIGKILL);
-    ::waitpid(std::exchange(pid_, -1), nullptr, 0);
-  }
-
- private:
-  pid_t pid_ = -1;
-};
 
 class KillCampaign : public testing::Test {
  protected:
   static bool is_long() { return std::getenv("HILBRUSH_LONG") != nullptr; }
 
-  std::unique_ptr<LineClient> connect() {
-    for (int attempt = 0; attempt < 4000; ++attempt) {
-      try {
-        return std::make_unique<LineClient>(daemons_.options.socket);
-      } catch (const std::runtime_error&) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      }
-    }
-    throw std::runtime_error("hilbrushd does not come up");
-  }
   Json job(LineClient& client) { return client.result("job.get", {{"id", id_}}).at("job"); }
   /// What an operator does until the job is being painted, or done. On a busy machine the laser's guard may have turned
   /// it off meanwhile: then all three acts are made again.
@@ -109,23 +64,23 @@ class KillCampaign : public testing::Test {
 };
 
 TEST_F(KillCampaign, NoDotTwiceNoneLostAtMostOneInDoubtEach) {
-  if (::access((std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd").c_str(), X_OK) != 0)
-    GTEST_SKIP() << "hilbrushd is not built";
+  if (!test::is_built()) GTEST_SKIP() << "hilbrushd is not built";
   const unsigned seed = 20261;
   SCOPED_TRACE(seed);
   std::mt19937 random(seed);
   daemons_.options.cell = world_.cell_file().string();
+  daemons_.options.time_scale.reset();  // the cell file's
   {
-    KilledDaemon daemon(daemons_.options);
-    const auto client = connect();
+    const DaemonProcess daemon(daemons_.options);
+    const auto client = connect(daemons_.options, 4000);
     id_ = daemons_.submit(*client, daemons_.model("cup.wrl", dots_), "ready");
   }
   const double kill_after_max_s = is_long() ? 1 : .06;
   std::size_t last_done = 0, doubts = 0;
   int kills = 0;
   for (; kills < kills_; ++kills) {
-    KilledDaemon daemon(daemons_.options);
-    const auto client = connect();
+    DaemonProcess daemon(daemons_.options);
+    const auto client = connect(daemons_.options, 4000);
     const Json before = job(*client);
     if (before.at("state") == "done") break;
     ASSERT_EQ(before.at("state"), kills == 0 ? "ready" : "paused");
@@ -137,11 +92,11 @@ TEST_F(KillCampaign, NoDotTwiceNoneLostAtMostOneInDoubtEach) {
     // What a stop by the guard left in doubt is not the kill's.
     doubts = job(*client).at("dots").at("in_doubt").get<std::size_t>();
     std::this_thread::sleep_for(std::chrono::duration<double>(kill_after_max_s * (random() % 1000) / 1000.));
-    daemon.kill();
+    daemon.end(SIGKILL);
   }
   EXPECT_GT(last_done, 0u);
-  KilledDaemon daemon(daemons_.options);
-  const auto client = connect();
+  const DaemonProcess daemon(daemons_.options);
+  const auto client = connect(daemons_.options, 4000);
   finish(*client);
   const Json after = job(*client);
   const auto in_doubt = after.at("in_doubt").get<std::set<std::size_t>>();

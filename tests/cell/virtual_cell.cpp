@@ -89,6 +89,78 @@ void VirtualLink::exchange(const std::function<bool()>& act) {
   }
 }
 
+void VirtualDevice::fail(const std::string& sentence) {
+  state_ = DeviceState::kFault;
+  fault_ = sentence;
+}
+
+void VirtualDevice::fault_if_lost() {
+  if (!link_.is_lost() || state_ == DeviceState::kDisconnected || state_ == DeviceState::kFault) return;
+  fail("it " + link_.why());
+}
+
+// ---- axes
+
+template <std::size_t N>
+void VirtualAxes<N>::home() {
+  state_ = DeviceState::kReady;
+  has_target_ = false;
+}
+
+template <std::size_t N>
+void VirtualAxes<N>::disable() noexcept {
+  stop();
+  if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
+}
+
+template <std::size_t N>
+void VirtualAxes<N>::move_to(const Positions& target, double settle_s) {
+  if (state_ != DeviceState::kReady) throw DriverError("the axes are not ready");
+  has_target_ = false;
+  target_ = target;
+  settle_s_ = settle_s;
+  rest_since_s_ = -1;
+  order_move(target);
+  has_target_ = true;
+}
+
+template <std::size_t N>
+typename VirtualAxes<N>::Status VirtualAxes<N>::status() {
+  if (state_ != DeviceState::kDisconnected && !link_.is_lost()) look();
+  fault_if_lost();
+  judge();
+  const double now_s = clock_.now_s();
+  if (!has_target_ || !is_at_rest() || !is_near(seen_, target_))
+    rest_since_s_ = -1;
+  else if (rest_since_s_ < 0)
+    rest_since_s_ = now_s;
+  Status status;
+  status.in_position =
+      state_ == DeviceState::kReady && has_target_ && rest_since_s_ >= 0 && now_s >= rest_since_s_ + settle_s_;
+  status.state = state_ == DeviceState::kReady && has_target_ && !status.in_position ? DeviceState::kMoving : state_;
+  status.positions = seen_;
+  status.fault = fault_;
+  return status;
+}
+
+template <std::size_t N>
+double VirtualAxes<N>::expected_arrival_s() {
+  return rest_since_s_ >= 0 ? rest_since_s_ + settle_s_ : clock_.now_s();
+}
+
+template <std::size_t N>
+void VirtualAxes<N>::stop() noexcept {
+  has_target_ = false;
+  try {
+    order_stop();
+  } catch (const DriverError& error) {
+    if (state_ == DeviceState::kReady || state_ == DeviceState::kEnabled) fail(error.what());
+  }
+}
+
+template class VirtualAxes<4>;
+template class VirtualAxes<2>;
+
 // ---- robot
 
 void VirtualRobot::command(bool is_motion, const std::string& name, const std::vector<std::string>& arguments) {
@@ -120,12 +192,6 @@ void VirtualRobot::look() {
   }
 }
 
-void VirtualRobot::fault_if_lost() {
-  if (!link_.is_lost() || state_ == DeviceState::kDisconnected || state_ == DeviceState::kFault) return;
-  state_ = DeviceState::kFault;
-  fault_ = "it " + link_.why();
-}
-
 void VirtualRobot::connect() {
   link_.connect();
   command(false, "robotmode", {});
@@ -139,14 +205,6 @@ void VirtualRobot::enable() {
   if (mode_ != 5) throw DriverError("the robot is not enabled");
   state_ = DeviceState::kEnabled;
 }
-void VirtualRobot::home() {
-  state_ = DeviceState::kReady;
-  has_target_ = false;
-}
-void VirtualRobot::disable() noexcept {
-  stop();
-  if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
-}
 void VirtualRobot::clear_fault() {
   link_.connect();
   command(false, "resetrobot", {});
@@ -155,57 +213,22 @@ void VirtualRobot::clear_fault() {
   state_ = DeviceState::kConnected;
 }
 
-void VirtualRobot::move_to(const Positions& target, double settle_s) {
-  if (state_ != DeviceState::kReady) throw DriverError("the robot is not ready");
+void VirtualRobot::order_move(const Positions& target) {
   std::vector<std::string> arguments;
   for (std::size_t i = 0; i < 4; ++i) arguments.push_back(printed(target[i] / wire_unit(i)));
-  has_target_ = false;
-  target_ = target;
-  settle_s_ = settle_s;
-  rest_since_s_ = -1;
   command(true, "jointmovj", arguments);
-  has_target_ = true;
 }
 
-Robot::Status VirtualRobot::status() {
-  if (state_ != DeviceState::kDisconnected && !link_.is_lost()) look();
-  fault_if_lost();
+void VirtualRobot::judge() {
   const bool is_on = state_ == DeviceState::kReady || state_ == DeviceState::kEnabled;
   constexpr int kAlarm = 9;
-  if ((is_on && mode_ != 5 && mode_ != 7) || (state_ == DeviceState::kConnected && mode_ == kAlarm)) {
-    state_ = DeviceState::kFault;
-    fault_ = "the robot is in alarm";
-  }
-  const double now_s = clock_.now_s();
-  // Its queue runs as long as a pulse does.
-  const bool is_at_rest = mode_ == 5 || (mode_ == 7 && is_output_on_);
-  if (!has_target_ || !is_at_rest || !is_near(seen_, target_))
-    rest_since_s_ = -1;
-  else if (rest_since_s_ < 0)
-    rest_since_s_ = now_s;
-  Status status;
-  status.in_position =
-      state_ == DeviceState::kReady && has_target_ && rest_since_s_ >= 0 && now_s >= rest_since_s_ + settle_s_;
-  status.state = state_ == DeviceState::kReady && has_target_ && !status.in_position ? DeviceState::kMoving : state_;
-  status.positions = seen_;
-  status.fault = fault_;
-  return status;
+  if ((is_on && mode_ != 5 && mode_ != 7) || (state_ == DeviceState::kConnected && mode_ == kAlarm))
+    fail("the robot is in alarm");
 }
 
-double VirtualRobot::expected_arrival_s() {
-  return rest_since_s_ >= 0 ? rest_since_s_ + settle_s_ : clock_.now_s();
-}
-
-void VirtualRobot::stop() noexcept {
-  has_target_ = false;
-  try {
-    command(false, "resetrobot", {});
-  } catch (const DriverError& error) {
-    if (state_ == DeviceState::kReady || state_ == DeviceState::kEnabled) {
-      state_ = DeviceState::kFault;
-      fault_ = error.what();
-    }
-  }
+/// Its queue runs as long as a pulse does.
+bool VirtualRobot::is_at_rest() const {
+  return mode_ == 5 || (mode_ == 7 && is_output_on_);
 }
 
 void VirtualRobot::pulse(double pulse_s) {
@@ -251,20 +274,12 @@ void VirtualTable::look() {
         const DriveAxis::Report report = axis.report();
         seen_[i] = report.position / axis.steps_per_unit();
         is_reported_there_ = is_reported_there_ && report.is_in_position && !report.is_moving;
-        if (axis.alarm() == 0) continue;
-        state_ = DeviceState::kFault;
-        fault_ = "the table is in alarm";
+        if (axis.alarm() != 0) fail("the table is in alarm");
       }
       return true;
     });
   } catch (const DriverError&) {  // one reading less, or a lost link
   }
-}
-
-void VirtualTable::fault_if_lost() {
-  if (!link_.is_lost() || state_ == DeviceState::kDisconnected || state_ == DeviceState::kFault) return;
-  state_ = DeviceState::kFault;
-  fault_ = "it " + link_.why();
 }
 
 void VirtualTable::connect() {
@@ -276,14 +291,6 @@ void VirtualTable::enable() {
   link_.exchange([] { return true; });
   state_ = DeviceState::kEnabled;
 }
-void VirtualTable::home() {
-  state_ = DeviceState::kReady;
-  has_target_ = false;
-}
-void VirtualTable::disable() noexcept {
-  stop();
-  if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
-}
 void VirtualTable::clear_fault() {
   link_.connect();
   link_.exchange([&] {
@@ -294,55 +301,20 @@ void VirtualTable::clear_fault() {
   state_ = DeviceState::kConnected;
 }
 
-void VirtualTable::move_to(const Positions& target, double settle_s) {
-  if (state_ != DeviceState::kReady) throw DriverError("the table is not ready");
-  has_target_ = false;
-  target_ = target;
-  settle_s_ = settle_s;
-  rest_since_s_ = -1;
+void VirtualTable::order_move(const Positions& target) {
   for (std::size_t i = 0; i < 2; ++i)
     link_.exchange([&] {
       DriveAxis& axis = devices_.table_axis(i);
       return axis.alarm() == 0 && axis.move(axis.steps(target[i]), axis.limits().speed_max * axis.steps_per_unit(),
                                             axis.limits().acceleration_max * axis.steps_per_unit());
     });
-  has_target_ = true;
 }
 
-Table::Status VirtualTable::status() {
-  if (state_ != DeviceState::kDisconnected && !link_.is_lost()) look();
-  fault_if_lost();
-  const double now_s = clock_.now_s();
-  if (!has_target_ || !is_reported_there_ || !is_near(seen_, target_))
-    rest_since_s_ = -1;
-  else if (rest_since_s_ < 0)
-    rest_since_s_ = now_s;
-  Status status;
-  status.in_position =
-      state_ == DeviceState::kReady && has_target_ && rest_since_s_ >= 0 && now_s >= rest_since_s_ + settle_s_;
-  status.state = state_ == DeviceState::kReady && has_target_ && !status.in_position ? DeviceState::kMoving : state_;
-  status.positions = seen_;
-  status.fault = fault_;
-  return status;
-}
-
-double VirtualTable::expected_arrival_s() {
-  return rest_since_s_ >= 0 ? rest_since_s_ + settle_s_ : clock_.now_s();
-}
-
-void VirtualTable::stop() noexcept {
-  has_target_ = false;
-  try {
-    link_.exchange([&] {
-      for (std::size_t i = 0; i < 2; ++i) devices_.table_axis(i).stop();
-      return true;
-    });
-  } catch (const DriverError& error) {
-    if (state_ == DeviceState::kReady || state_ == DeviceState::kEnabled) {
-      state_ = DeviceState::kFault;
-      fault_ = error.what();
-    }
-  }
+void VirtualTable::order_stop() {
+  link_.exchange([&] {
+    for (std::size_t i = 0; i < 2; ++i) devices_.table_axis(i).stop();
+    return true;
+  });
 }
 
 // ---- laser
@@ -350,12 +322,6 @@ void VirtualTable::stop() noexcept {
 Laser::Limits VirtualLaser::limits() {
   const auto& laser = devices_.cell().description().laser;
   return {laser.power_min_w, laser.power_max_w, laser.pulse_min_s, laser.pulse_max_s};
-}
-
-void VirtualLaser::fault_if_lost() {
-  if (!link_.is_lost() || state_ == DeviceState::kDisconnected || state_ == DeviceState::kFault) return;
-  state_ = DeviceState::kFault;
-  fault_ = "it " + link_.why();
 }
 
 void VirtualLaser::connect() {
@@ -417,14 +383,9 @@ Laser::Status VirtualLaser::status() {
     try {
       link_.exchange([&] {
         is_closed_ = devices_.cell().is_interlock_closed();
-        if (devices_.cell().is_tripped() && state_ == DeviceState::kReady) {
-          state_ = DeviceState::kFault;
-          fault_ = "the interlock was opened";
-        }
-        if (devices_.cell().power_w() != power_w_ && state_ == DeviceState::kReady) {
-          state_ = DeviceState::kFault;
-          fault_ = "its power is not what was set";
-        }
+        if (devices_.cell().is_tripped() && state_ == DeviceState::kReady) fail("the interlock was opened");
+        if (devices_.cell().power_w() != power_w_ && state_ == DeviceState::kReady)
+          fail("its power is not what was set");
         if (!devices_.cell().is_emission_ordered() && state_ == DeviceState::kReady) state_ = DeviceState::kConnected;
         return true;
       });

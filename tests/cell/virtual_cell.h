@@ -44,19 +44,61 @@ class VirtualLink {
   std::string lost_;
 };
 
-class VirtualRobot final : public Robot {
+/// A device's life cycle over such a link.
+class VirtualDevice {
  public:
-  VirtualRobot(WiredDevices& devices, VirtualClock& clock)
-      : devices_(devices), clock_(clock), link_(WireDevice::kRobot, devices, clock) {}
-  void connect() override;
-  void enable() override;
+  VirtualDevice(WireDevice device, WiredDevices& devices, VirtualClock& clock)
+      : devices_(devices), clock_(clock), link_(device, devices, clock) {}
+
+ protected:
+  void fail(const std::string& sentence);
+  void fault_if_lost();
+  WiredDevices& devices_;
+  VirtualClock& clock_;
+  VirtualLink link_;
+  DeviceState state_ = DeviceState::kDisconnected;
+  std::string fault_;
+};
+
+/// What robot and table have in common: where they were sent, where they were last seen, and since when they rest.
+template <std::size_t N>
+class VirtualAxes : public AxisGroup<N>, protected VirtualDevice {
+ public:
+  using Positions = typename AxisGroup<N>::Positions;
+  using Status = typename AxisGroup<N>::Status;
+  using VirtualDevice::VirtualDevice;
+
   void home() override;
   void disable() noexcept override;
-  void clear_fault() override;
   void move_to(const Positions& target, double settle_s) override;
   Status status() override;
   double expected_arrival_s() override;
   void stop() noexcept override;
+
+ protected:
+  /// Reads where the axes are, and what the device says of itself; a reading that fails is one less.
+  virtual void look() = 0;
+  virtual void order_move(const Positions& target) = 0;
+  virtual void order_stop() = 0;
+  /// Whether the device, as last seen, says that nothing moves.
+  virtual bool is_at_rest() const = 0;
+  /// After each reading: what of it is a fault.
+  virtual void judge() {}
+
+  Positions seen_{};
+
+ private:
+  Positions target_{};
+  bool has_target_ = false;
+  double settle_s_ = 0, rest_since_s_ = -1;
+};
+
+class VirtualRobot final : public VirtualAxes<4> {
+ public:
+  VirtualRobot(WiredDevices& devices, VirtualClock& clock) : VirtualAxes(WireDevice::kRobot, devices, clock) {}
+  void connect() override;
+  void enable() override;
+  void clear_fault() override;
 
   // The gate: an output of the robot.
   void pulse(double pulse_s);
@@ -65,50 +107,34 @@ class VirtualRobot final : public Robot {
 
  private:
   void command(bool is_motion, const std::string& name, const std::vector<std::string>& arguments);
-  void look();
-  void fault_if_lost();
-  WiredDevices& devices_;
-  VirtualClock& clock_;
-  VirtualLink link_;
-  DeviceState state_ = DeviceState::kDisconnected;
-  std::string fault_;
+  void look() override;
+  void order_move(const Positions& target) override;
+  void order_stop() override { command(false, "resetrobot", {}); }
+  bool is_at_rest() const override;
+  void judge() override;
   int mode_ = 4;
-  Positions seen_{}, target_{};
-  bool has_target_ = false, is_output_on_ = false;
-  double settle_s_ = 0, rest_since_s_ = -1;
+  bool is_output_on_ = false;
 };
 
-class VirtualTable final : public Table {
+class VirtualTable final : public VirtualAxes<2> {
  public:
-  VirtualTable(WiredDevices& devices, VirtualClock& clock)
-      : devices_(devices), clock_(clock), link_(WireDevice::kTable, devices, clock) {}
+  VirtualTable(WiredDevices& devices, VirtualClock& clock) : VirtualAxes(WireDevice::kTable, devices, clock) {}
   void connect() override;
   void enable() override;
-  void home() override;
-  void disable() noexcept override;
   void clear_fault() override;
-  void move_to(const Positions& target, double settle_s) override;
-  Status status() override;
-  double expected_arrival_s() override;
-  void stop() noexcept override;
 
  private:
-  void look();
-  void fault_if_lost();
-  WiredDevices& devices_;
-  VirtualClock& clock_;
-  VirtualLink link_;
-  DeviceState state_ = DeviceState::kDisconnected;
-  std::string fault_;
-  Positions seen_{}, target_{};
-  bool has_target_ = false, is_reported_there_ = false;
-  double settle_s_ = 0, rest_since_s_ = -1;
+  void look() override;
+  void order_move(const Positions& target) override;
+  void order_stop() override;
+  bool is_at_rest() const override { return is_reported_there_; }
+  bool is_reported_there_ = false;
 };
 
-class VirtualLaser final : public Laser {
+class VirtualLaser final : public Laser, private VirtualDevice {
  public:
   VirtualLaser(WiredDevices& devices, VirtualRobot& robot, VirtualClock& clock)
-      : devices_(devices), robot_(robot), clock_(clock), link_(WireDevice::kLaser, devices, clock) {}
+      : VirtualDevice(WireDevice::kLaser, devices, clock), robot_(robot) {}
   void connect() override;
   Limits limits() override;
   void enable() override;
@@ -119,13 +145,7 @@ class VirtualLaser final : public Laser {
   void clear_fault() override;
 
  private:
-  void fault_if_lost();
-  WiredDevices& devices_;
   VirtualRobot& robot_;
-  VirtualClock& clock_;
-  VirtualLink link_;
-  DeviceState state_ = DeviceState::kDisconnected;
-  std::string fault_;
   bool is_closed_ = true;
   double power_w_ = 0;
 };

@@ -14,15 +14,22 @@ using test::broken_invariants;
 using test::small_job;
 using test::WiredWorld;
 
-TEST(WholeJobTest, ASmallProgramThroughTheRealDrivers) {
-  WiredWorld world(WiredWorld::quick(.05));
-  const ExposureProgram program = small_job(world.description, 60);
+/// The journal of a program that was painted from beginning to end.
+Journal painted(WiredWorld& world, const ExposureProgram& program) {
   ExecutionControl control;
   world.recover(control);
   Journal journal = Journal::in_memory(program.exposures.size());
   const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
-  EXPECT_EQ(result.exposed, 60u);
+  EXPECT_EQ(result.exposed, program.exposures.size());
+  return journal;
+}
+
+TEST(WholeJobTest, ASmallProgramThroughTheRealDrivers) {
+  WiredWorld world(WiredWorld::quick(.05));
+  const ExposureProgram program = small_job(world.description, 60);
+  const Journal journal = painted(world, program);
+  EXPECT_EQ(journal.done_count(), 60u);
   EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
   // Where the light was, by the simulated cell's own kinematics.
   const auto emissions = world.emissions();
@@ -42,11 +49,7 @@ TEST(WholeJobTest, OverSerialLines) {
   options.is_table_serial = options.is_laser_serial = true;
   WiredWorld world(options);
   const ExposureProgram program = small_job(world.description, 40, 3, 8);
-  ExecutionControl control;
-  world.recover(control);
-  Journal journal = Journal::in_memory(program.exposures.size());
-  const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
-  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  const Journal journal = painted(world, program);
   EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
 }
 
@@ -58,11 +61,7 @@ TEST(WholeJobTest, ByRegisterMaps) {
     options.table = table;
     WiredWorld world(options);
     const ExposureProgram program = small_job(world.description, 20, 4, 5);
-    ExecutionControl control;
-    world.recover(control);
-    Journal journal = Journal::in_memory(program.exposures.size());
-    const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
-    EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+    const Journal journal = painted(world, program);
     EXPECT_EQ("", broken_invariants(program, journal, world.emissions()));
   }
 }
@@ -73,11 +72,7 @@ TEST(WholeJobTest, ByASerialGate) {
   options.laser = WireOptions::LaserHead::kCobolt;
   WiredWorld world(options);
   const ExposureProgram program = small_job(world.description, 6, 4, 5);
-  ExecutionControl control;
-  world.recover(control);
-  Journal journal = Journal::in_memory(program.exposures.size());
-  const ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
-  EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  painted(world, program);
   const auto testimony = test::hear_witness(program, world.emissions());
   EXPECT_EQ(testimony.in_motion, 0u);
   EXPECT_EQ(testimony.strays, 0u);

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <chrono>
 #include <random>
+#include <stdexcept>
 #include <thread>
 
 #include "config/cell_file.h"
 #include "config/json_reader.h"
 #include "config/wired_cell_file.h"
 #include "drivers/driver_error.h"
+#include "sim/devices/sim_cell.h"
+#include "tests/daemon/program_fixture.h"
 
 namespace hilbrush::test {
 namespace {
@@ -72,6 +75,20 @@ std::vector<Emission> WiredWorld::emissions() const {
   return emissions_;
 }
 
+std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description) {
+  description.simulation.time_scale = 0;
+  SimCell sim(description);
+  std::vector<Emission> emissions;
+  sim.set_emission_sink([&](const Emission& emission) { emissions.push_back(emission); });
+  bring_up(sim.cell());
+  Journal journal = Journal::in_memory(program.exposures.size());
+  ExecutionControl control;
+  const ExecutionResult result = execute(program, {}, sim.cell(), description, journal, control);
+  if (result.outcome != ExecutionOutcome::kFinished)
+    throw std::runtime_error("the cell in process did not finish: " + result.reason);
+  return emissions;
+}
+
 ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsigned seed, std::size_t table_every) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> step(-.004, .004);
@@ -96,16 +113,7 @@ ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsign
       at[k] = std::clamp(at[k] + step(random), home[k] - .2, home[k] + .2);
     }
     at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .15, .21);
-    Exposure exposure;
-    exposure.position_O = {1e-3 * static_cast<double>(i % 100), 1e-3 * static_cast<double>(i / 100), .05};
-    exposure.normal_O = {0, 0, 1};
-    exposure.tone = .5f;
-    exposure.power_w = .01f;
-    exposure.pulse_s = .005f;
-    exposure.energy_j = exposure.power_w * exposure.pulse_s;
-    exposure.joints = at;
-    exposure.dot_index = static_cast<std::uint32_t>(i);
-    program.exposures.push_back(exposure);
+    program.exposures.push_back(small_exposure(i, at));
   }
   program.vias.push_back({static_cast<std::uint32_t>(count), home});
   return program;

@@ -51,6 +51,9 @@ class WiredWorld {
 /// The shipped cell.
 CellDescription shipped_cell();
 
+/// What the same cell emits in process, under virtual time. @throws std::runtime_error if it does not finish
+std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description);
+
 /// A program for the shipped cell: small steps of the arm about its home, a table move every `table_every` exposures
 /// with a way-point before it, a way home. Each exposure's joints are its own.
 ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsigned seed = 1,

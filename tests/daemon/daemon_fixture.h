@@ -16,6 +16,14 @@ namespace hilbrush::test {
 
 using Json = nlohmann::ordered_json;
 
+/// Parameters of the methods that name a job, and of those that say that its part is in place.
+inline Json named(const std::string& id) {
+  return {{"id", id}};
+}
+inline Json placed(const std::string& id) {
+  return {{"id", id}, {"part_in_place", true}};
+}
+
 /// One connection. Every wait ends in a failure after kPatience.
 class LineClient {
  public:

@@ -21,6 +21,15 @@ using test::Place;
 using test::small_program;
 using test::WitnessedCell;
 
+/// Strikes at the `call`-th call of `place`.
+Fault fault_at(Place place, Kind kind, int call) {
+  Fault fault;
+  fault.place = place;
+  fault.kind = kind;
+  fault.countdown = call;
+  return fault;
+}
+
 /// Runs the program on a cell with one fault, then on one without; whatever the first run came to, the witness must
 /// agree with the journal, and the rest must be painted. False if the fault never struck.
 bool survives(Place place, Kind kind, int call, const ExposureProgram& program) {
@@ -28,10 +37,7 @@ bool survives(Place place, Kind kind, int call, const ExposureProgram& program) 
   const std::size_t count = program.exposures.size();
   Journal journal = Journal::in_memory(count);
   ExecutionControl control;
-  Fault fault;
-  fault.place = place;
-  fault.kind = kind;
-  fault.countdown = call;
+  Fault fault = fault_at(place, kind, call);
   const Cell inner = world.cell();
   fault.open_interlock = [&] { world.sim().set_interlock_closed(false); };
   fault.stop = [&] { request_stop(inner, control); };
@@ -91,10 +97,7 @@ TEST(ExecutorFaultsTest, ALateAcknowledgementOfAPulseLeavesItsDotInDoubt) {
   const auto program = small_program(20);
   Journal journal = Journal::in_memory(20);
   ExecutionControl control;
-  Fault fault;
-  fault.place = Place::kFire;
-  fault.kind = Kind::kThrowsLate;
-  fault.countdown = 8;
+  Fault fault = fault_at(Place::kFire, Kind::kThrowsLate, 8);
   FaultyLaser laser(world.cell().laser, fault);
   const auto result = execute(program, {}, {world.cell().robot, world.cell().table, laser, world.cell().clock},
                               world.description, journal, control);
@@ -108,10 +111,7 @@ TEST(ExecutorFaultsTest, AStaleInPositionIsNotBelieved) {
   const auto program = small_program(40);
   Journal journal = Journal::in_memory(40);
   ExecutionControl control;
-  Fault fault;
-  fault.place = Place::kRobotMove;
-  fault.kind = Kind::kStalePosition;
-  fault.countdown = 10;
+  Fault fault = fault_at(Place::kRobotMove, Kind::kStalePosition, 10);
   FaultyAxes<4> robot(world.cell().robot, fault);
   const auto result = execute(program, {}, {robot, world.cell().table, world.cell().laser, world.cell().clock},
                               world.description, journal, control);
@@ -124,15 +124,11 @@ class AnAxisThatStandsElsewhere : public ::testing::TestWithParam<int> {};
 
 /// Before, in or after a pulse, as the call falls.
 TEST_P(AnAxisThatStandsElsewhere, IsAFaultAndSaysSo) {
-  const int call = GetParam();
   WitnessedCell world;
   const auto program = small_program(40);
   Journal journal = Journal::in_memory(40);
   ExecutionControl control;
-  Fault fault;
-  fault.place = Place::kTableStatus;
-  fault.kind = Kind::kElsewhere;
-  fault.countdown = call;
+  Fault fault = fault_at(Place::kTableStatus, Kind::kElsewhere, GetParam());
   FaultyAxes<2> table(world.cell().table, fault);
   const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
                               world.description, journal, control);

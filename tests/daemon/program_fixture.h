@@ -37,6 +37,20 @@ inline CellDescription small_cell(double time_scale = 0) {
   return cell;
 }
 
+/// The i-th exposure of a program: a pulse of 5 ms at 10 mW.
+inline Exposure small_exposure(std::size_t i, const Joints& joints) {
+  Exposure exposure;
+  exposure.position_O = {1e-3 * static_cast<double>(i % 100), 1e-3 * static_cast<double>(i / 100), .05};
+  exposure.normal_O = {0, 0, 1};
+  exposure.tone = .5f;
+  exposure.power_w = .01f;
+  exposure.pulse_s = .005f;
+  exposure.energy_j = exposure.power_w * exposure.pulse_s;
+  exposure.joints = joints;
+  exposure.dot_index = static_cast<std::uint32_t>(i);
+  return exposure;
+}
+
 /// Small steps of the arm, a table move every 50 exposures with two way-points before it, a way home. Each exposure's
 /// joints are its own.
 inline ExposureProgram small_program(std::size_t count, unsigned seed = 1) {
@@ -58,16 +72,7 @@ inline ExposureProgram small_program(std::size_t count, unsigned seed = 1) {
     for (int axis : {kJ1, kJ2, kJ4})
       at[static_cast<std::size_t>(axis)] = std::clamp(at[static_cast<std::size_t>(axis)] + step(random), -1.5, 1.5);
     at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .05, .14);
-    Exposure exposure;
-    exposure.position_O = {1e-3 * static_cast<double>(i % 100), 1e-3 * static_cast<double>(i / 100), .05};
-    exposure.normal_O = {0, 0, 1};
-    exposure.tone = .5f;
-    exposure.power_w = .01f;
-    exposure.pulse_s = .005f;
-    exposure.energy_j = exposure.power_w * exposure.pulse_s;
-    exposure.joints = at;
-    exposure.dot_index = static_cast<std::uint32_t>(i);
-    program.exposures.push_back(exposure);
+    program.exposures.push_back(small_exposure(i, at));
   }
   program.vias.push_back({static_cast<std::uint32_t>(count), Joints{.5, .5, .1, 0, 0, 0}});
   return program;

@@ -22,13 +22,8 @@ namespace fs = std::filesystem;
 using test::DaemonWorld;
 using test::Json;
 using test::LineClient;
-
-Json named(const std::string& id) {
-  return {{"id", id}};
-}
-Json placed(const std::string& id) {
-  return {{"id", id}, {"part_in_place", true}};
-}
+using test::named;
+using test::placed;
 
 /// The witness: emissions by exposure of the job's program, and none that belongs to no exposure or was made in motion.
 std::vector<std::size_t> emission_counts(const fs::path& job_folder) {

@@ -17,81 +17,22 @@
 #include "planner/program_file.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
-
-extern char** environ;
+#include "tests/daemon/daemon_process.h"
 
 namespace hilbrush {
 namespace {
 
+using test::connect;
+using test::DaemonProcess;
 using test::DaemonWorld;
+using test::is_built;
 using test::Json;
 using test::LineClient;
-
-/// The program hilbrushd in a process of its own, which can be killed as no daemon in this process could.
-class DaemonProcess {
- public:
-  /// `environment`: NAME=value, on top of this process's own.
-  explicit DaemonProcess(const DaemonOptions& options, std::vector<std::string> environment = {}) {
-    const std::string program = std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd";
-    std::vector<std::string> arguments{program,
-                                       "--socket",
-                                       options.socket.string(),
-                                       "--state",
-                                       options.state.string(),
-                                       "--cell",
-                                       options.cell,
-                                       "--time-scale",
-                                       std::to_string(*options.time_scale),
-                                       "--pipeline",
-                                       options.pipeline.string(),
-                                       "--log-level",
-                                       "off"};
-    std::vector<char*> argv;
-    for (auto& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    std::vector<char*> envp;
-    for (auto& variable : environment) envp.push_back(variable.data());
-    for (char** variable = environ; *variable != nullptr; ++variable) envp.push_back(*variable);
-    envp.push_back(nullptr);
-    EXPECT_EQ(::posix_spawn(&pid_, program.c_str(), nullptr, nullptr, argv.data(), envp.data()), 0);
-  }
-  ~DaemonProcess() { end(SIGKILL); }
-  DaemonProcess(const DaemonProcess&) = delete;
-  DaemonProcess& operator=(const DaemonProcess&) = delete;
-
-  pid_t pid() const { return pid_; }
-  /// The exit code, or minus the signal's number.
-  int end(int signal) {
-    if (pid_ <= 0) return 0;
-    ::kill(pid_, signal);
-    int status = 0;
-    ::waitpid(std::exchange(pid_, -1), &status, 0);
-    return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
-  }
-
- private:
-  pid_t pid_ = -1;
-};
-
-std::unique_ptr<LineClient> connect(const DaemonOptions& options) {
-  for (int attempt = 0; attempt < 2000; ++attempt) {
-    try {
-      return std::make_unique<LineClient>(options.socket);
-    } catch (const std::runtime_error&) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  }
-  throw std::runtime_error("hilbrushd does not come up");
-}
 
 std::string key_of(const Joints& joints) {
   std::string key;
   for (const double value : joints) key += std::to_string(std::llround(value * 1e10)) + " ";
   return key;
-}
-
-bool is_built() {
-  return ::access((std::string(HILBRUSH_BUILD_DIR) + "/hilbrushd").c_str(), X_OK) == 0;
 }
 
 /// By the witness: no dot twice, and each that is not in doubt once.

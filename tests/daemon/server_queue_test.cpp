@@ -20,10 +20,7 @@ namespace fs = std::filesystem;
 using test::DaemonWorld;
 using test::Json;
 using test::LineClient;
-
-Json placed(const std::string& id) {
-  return {{"id", id}, {"part_in_place", true}};
-}
+using test::placed;
 
 Json job_of(LineClient& client, const std::string& id) {
   return client.result("job.get", {{"id", id}}).at("job");

@@ -1,8 +1,8 @@
 #pragma once
 #include <filesystem>
-#include <memory>
 
 #include "daemon/server/cell_devices.h"
+#include "sim/devices/emission_keeper.h"
 #include "sim/devices/sim_cell.h"
 
 /// The simulated cell as a daemon's devices, within the test's reach.
@@ -13,16 +13,10 @@ class SimDevices final : public CellDevices {
   explicit SimDevices(const CellDescription& description) : sim(description, {.laser_start_delay_s = 0}) {}
   Cell cell() override { return sim.cell(); }
   bool is_simulated() const override { return true; }
-  void record_emissions(const std::filesystem::path& file) override {
-    sim.set_emission_sink({});
-    record_.reset();
-    if (file.empty()) return;
-    record_ = std::make_unique<EmissionRecordFile>(file);
-    sim.set_emission_sink([this](const Emission& emission) { record_->append(emission); });
-  }
+  void record_emissions(const std::filesystem::path& file) override { keeper_.record(sim, file); }
 
  private:
-  std::unique_ptr<EmissionRecordFile> record_;  // outlives the cell, whose laser may still end a pulse
+  EmissionKeeper keeper_;
 
  public:
   SimCell sim;

@@ -16,12 +16,22 @@ WireOptions with_laser(WireOptions::LaserHead head, double start_delay_s = 0, do
   return options;
 }
 
-class ObisTest : public testing::Test {
+/// A laser that is spoken to in lines.
+class LaserHeadTest : public testing::Test {
  protected:
-  std::string ask(const std::string& line) { return world.ask(*session, line + "\r\n"); }
-  WireWorld world{with_laser(WireOptions::LaserHead::kObis, 5)};
+  LaserHeadTest(const WireOptions& options, const char* line_end) : world(options), line_end_(line_end) {}
+  std::string ask(const std::string& line) { return world.ask(*session, line + line_end_); }
+  WireWorld world;
   std::unique_ptr<WireSession> session = world.converse(Conversation::kLaser);
   TrueCell& cell = world.devices.cell();
+
+ private:
+  const char* line_end_;
+};
+
+class ObisTest : public LaserHeadTest {
+ protected:
+  ObisTest() : LaserHeadTest(with_laser(WireOptions::LaserHead::kObis, 5), "\r\n") {}
 };
 
 TEST_F(ObisTest, AnswersQueriesWithValueAndOk) {
@@ -98,12 +108,9 @@ TEST(ObisWarmUpTest, TakesTime) {
   EXPECT_TRUE(world.devices.cell().is_emitting());
 }
 
-class CoboltTest : public testing::Test {
+class CoboltTest : public LaserHeadTest {
  protected:
-  std::string ask(const std::string& line) { return world.ask(*session, line + "\r"); }
-  WireWorld world{with_laser(WireOptions::LaserHead::kCobolt)};
-  std::unique_ptr<WireSession> session = world.converse(Conversation::kLaser);
-  TrueCell& cell = world.devices.cell();
+  CoboltTest() : LaserHeadTest(with_laser(WireOptions::LaserHead::kCobolt), "\r") {}
 };
 
 TEST_F(CoboltTest, ModulatesBySerialCommandsWithoutAnswers) {
