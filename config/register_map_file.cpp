@@ -29,6 +29,10 @@ std::uint32_t code(JsonObject& json, const std::string& key, std::uint32_t max =
   return value;
 }
 
+bool share_words(const MappedRegister& one, const MappedRegister& other) {
+  return one.address < other.address + other.words && other.address < one.address + one.words;
+}
+
 class MapReader {
  public:
   RegisterMap read(JsonObject& json) {
@@ -51,13 +55,16 @@ class MapReader {
     map_.enable = read_steps(json, "enable");
     map_.disable = read_steps(json, "disable");
     map_.home = read_steps(json, "home");
+    map_.prepare = read_steps(json, "prepare");
     map_.move = read_steps(json, "move");
     map_.stop = read_steps(json, "stop");
     map_.resume = read_steps(json, "resume");
     map_.clear_fault = read_steps(json, "clear_fault");
     const auto takes_target = [](const RegisterStep& step) { return step.source == RegisterStep::Source::kTarget; };
-    if (std::none_of(map_.move.begin(), map_.move.end(), takes_target))
-      json.refuse("move", "writes the target nowhere");
+    if (std::none_of(map_.move.begin(), map_.move.end(), takes_target) &&
+        std::none_of(map_.prepare.begin(), map_.prepare.end(), takes_target))
+      json.refuse("move", "writes the target nowhere, nor does prepare");
+    check_prepare(json);
     if (map_.stop.empty()) json.refuse("stop", "has no step: an axis that can't be stopped is not driven");
     if (map_.arrived.empty() && !map_.setpoint)
       json.refuse("arrived", "is empty, and there is no setpoint: a move's end could not be told");
@@ -103,6 +110,21 @@ class MapReader {
     if (!json.has(key)) return steps;
     json.objects(key, kStepsMax, [&](JsonObject& entry) { steps.push_back(read_step(entry)); });
     return steps;
+  }
+
+  /// What is written while light is on must be inert: numbers in registers that no handshake works with.
+  void check_prepare(JsonObject& json) {
+    for (const RegisterStep& step : map_.prepare) {
+      if (step.kind != RegisterStep::Kind::kWrite || step.source == RegisterStep::Source::kConstant)
+        json.refuse("prepare", "may only write target, speed and acceleration");
+      for (const auto* steps :
+           {&map_.enable, &map_.disable, &map_.home, &map_.move, &map_.stop, &map_.resume, &map_.clear_fault})
+        for (const RegisterStep& other : *steps)
+          if (other.kind != RegisterStep::Kind::kPause &&
+              share_words(map_.registers[other.reg], map_.registers[step.reg]))
+            json.refuse("prepare", "writes " + map_.registers[step.reg].name +
+                                       ", which another list uses: what a handshake works with can't be written ahead");
+    }
   }
 
   RegisterStep read_step(JsonObject& json) {

@@ -100,8 +100,11 @@ class Run {
   template <std::size_t N>
   void send(AxisGroup<N>& chain, const Leg& leg, double settle_s);
   void wait_in_position(double deadline_s);
+  void prepare_exposure();
   void expose(std::size_t i);
   void prepare_next(std::size_t i);
+  template <std::size_t N>
+  void prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& told, std::size_t next);
   void check_pulse_conditions(const Laser::Status& laser);
   void wait_pulse_end(double fired_s, const Exposure& exposure);
   void count_own_time() { own_s_ += cell_.clock.now_s() - idle_since_s_; }
@@ -234,13 +237,20 @@ void Run::move(const Leg& leg, Rest rest) {
   robot_target_ = robot_part(leg.way.back());
   table_target_ = table_part(leg.way.back());
   count_own_time();
-  const double now_s = cell_.clock.now_s();
   if (leg.moves_robot) send(cell_.robot, leg, settle);
   if (leg.moves_table) send(cell_.table, leg, settle);
+  const double sent_s = cell_.clock.now_s();
   at_ = leg.way.back();
-  if (rest == Rest::kSettled) journal_.expect(next_exposure_);
-  wait_in_position(now_s + 2 * leg.travel_s + settle + grace_s(cell_.clock, kGraceS));
+  if (rest == Rest::kSettled) prepare_exposure();
+  wait_in_position(sent_s + 2 * leg.travel_s + settle + grace_s(cell_.clock, kGraceS));
   rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + leg.settle_s;
+}
+
+/// What the exposure at the end of the move needs, while the axes are under way.
+void Run::prepare_exposure() {
+  journal_.expect(next_exposure_);
+  const Exposure& exposure = program_.exposures[next_exposure_];
+  cell_.laser.prepare(exposure.power_w, exposure.pulse_s);
 }
 
 void Run::follow(std::span<const Joints> way, Rest rest) {
@@ -331,18 +341,26 @@ void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
   }
 }
 
+/// The first target ahead of a chain that is not where it was sent last, before or at exposure `next`.
+template <std::size_t N>
+void Run::prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& told, std::size_t next) {
+  const auto prepare = [&](const Joints& target) {
+    if (chain_part<N>(target) == told) return false;
+    if (is_within_limits(description_, target)) chain.prepare(chain_part<N>(target));
+    return true;
+  };
+  for (std::size_t v = next_via_; v < program_.vias.size() && program_.vias[v].before_exposure <= next; ++v)
+    if (prepare(program_.vias[v].joints)) return;
+  prepare(program_.exposures[next].joints);
+}
+
 /// While the pulse is on nothing moves, but what the next move needs can be on its way. Hints only: what is wrong with
 /// them the move itself will tell.
 void Run::prepare_next(std::size_t i) {
   if (i + 1 >= program_.exposures.size() || journal_.state(i + 1) != ExposureState::kRemaining) return;
-  const bool has_via = next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= i + 1;
-  const Joints& target = has_via ? program_.vias[next_via_].joints : program_.exposures[i + 1].joints;
-  if (!is_within_limits(description_, target)) return;
-  const Leg leg = plan_leg({&target, 1}, has_via ? Rest::kPassing : Rest::kSettled, cell_.clock.now_s());
-  const double settle = has_via ? 0 : leg.settle_s;
   try {
-    if (leg.moves_robot) cell_.robot.prepare(robot_part(target), settle);
-    if (leg.moves_table) cell_.table.prepare(table_part(target), settle);
+    prepare_chain(cell_.robot, *robot_target_, i + 1);
+    prepare_chain(cell_.table, *table_target_, i + 1);
   } catch (const DriverError&) {  // the move that follows will meet the same device
   }
 }

@@ -13,8 +13,8 @@
 /// Runs an exposure program on a cell: the only code that commands motion. One exposure: vias, move, in position and
 /// settled on both chains (by their word and by their measured positions), journal armed, pulse, laser proved off,
 /// journal done. The laser is off before every move, and on every way out. Way-points are handed ahead to devices that
-/// can buffer them, pulses never; while a pulse is on, the next set-point is prepared but nothing moves; while the axes
-/// move, the journal's next window goes to disk.
+/// can buffer them, pulses never; while a pulse is on, the next set-points go ahead without what starts a move, so that
+/// nothing moves; while the axes move, the journal's next window goes to disk and the laser is set to its next power.
 namespace hilbrush {
 
 /// How other threads reach a running executor; request_stop() sets `stop` and acts on the devices at once.

@@ -16,6 +16,7 @@ class AxisDrive {
     std::int32_t target = 0;         ///< steps
     std::uint32_t speed = 0;         ///< steps/s
     std::uint32_t acceleration = 0;  ///< steps/s2
+    bool operator==(const Move&) const = default;
   };
   struct Reading {
     double position = 0;             ///< measured, steps
@@ -35,8 +36,12 @@ class AxisDrive {
   virtual void enable(const GiveUp& give_up) = 0;
   virtual void disable() = 0;
   virtual void home(const GiveUp& give_up) = 0;
-  /// Returns when the drive has taken the order.
-  virtual void start(const Move& move, const GiveUp& give_up) = 0;
+  /// Writes of a move what starts none: nothing moves, now or later, by this alone. False if this drive has no such
+  /// part. What fails leaves the drive with data that the next whole order overwrites.
+  virtual bool write_ahead(const Move& move, const GiveUp& give_up) = 0;
+  /// Returns when the drive has taken the order. `is_ahead`: write_ahead() has written this very move, and nothing was
+  /// ordered since; only the rest of it is sent.
+  virtual void start(const Move& move, bool is_ahead, const GiveUp& give_up) = 0;
   virtual void stop() = 0;
   virtual void clear_fault() = 0;
   virtual std::string alarm_text(std::uint32_t alarm) const = 0;

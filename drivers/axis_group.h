@@ -45,11 +45,12 @@ class AxisGroup {
   /// foresees.
   virtual void move_to(const Positions& target, double settle_s) = 0;
   /// How many further targets move_to() takes while a move is under way: they are visited in order, each at rest;
-  /// in_position is about the last of them, and stop() forgets them all.
+  /// in_position is about the last of them, and stop() forgets them all. One more is refused.
   virtual std::size_t look_ahead() const { return 0; }
-  /// What can be sent ahead of the next move_to() (a set-point without its trigger), called while a pulse is on:
-  /// nothing may move. A hint, which the next move_to() need not follow.
-  virtual void prepare(const Positions& /*target*/, double /*settle_s*/) {}
+  /// A target that will be asked for next, told while a pulse is on: a device that can may be sent the set-point
+  /// without its trigger. Nothing moves by it. A hint that never waits for the device and is forgotten by a stop, a
+  /// fault and every other target; the next move_to() need not follow it.
+  virtual void prepare(const Positions& /*target*/) {}
   /// What is known by the last frame or reply: cheap, never waits for the device. When the answer changes in state,
   /// fault or in_position, devices that learn it by themselves wake the cell's clock. From any thread.
   virtual Status status() = 0;

@@ -99,7 +99,8 @@ struct RegisterMap {
   std::vector<RegisterTest> arrived;           ///< all of them: the drive says that its move is done
   std::vector<RegisterTest> homed;             ///< all of them: has its reference
   std::vector<RegisterStep> enable, disable, home, move, stop, clear_fault;
-  std::vector<RegisterStep> resume;  ///< before the first move after a stop
+  std::vector<RegisterStep> prepare;  ///< before `move`: writes that start nothing, and may go ahead while light is on
+  std::vector<RegisterStep> resume;   ///< before the first move after a stop
 };
 
 struct LaserOptions {

@@ -251,6 +251,9 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
     if (state_ != DeviceState::kReady) refuse("moved");
     for (const auto& [output, gate] : gates_)
       if (gate->is_pulsing()) throw DriverError("the robot refuses to move: a pulse is not over");
+    if (!is_target_current_ || is_in_position_) queued_ = 0;
+    if (queued_ > kLookAhead) throw DriverError("the robot refuses to move: too many targets are ahead");
+    ++queued_;
     const double start_s =
         std::max(clock_.now_s(), is_target_current_ && !is_in_position_ ? arrival_s_ - settle_s_ : 0);
     arrival_s_ = start_s + travel_s(is_target_current_ ? target_ : frame_.actual, joints) + settle_s;
@@ -329,10 +332,10 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     else if (state_ != DeviceState::kFault)
       is_news = judge_arrival(frame);
     for (const auto& [output, gate] : gates_)
-      if (!gate->agrees_with(frame)) {
+      if (const char* fault = gate->fault_in(frame)) {
         has_failed = true;
         gate->forget();
-        is_news = set_fault("the robot's output " + std::to_string(output) + " is on though nobody ordered it");
+        is_news = set_fault("the robot's output " + std::to_string(output) + " " + fault);
       }
     has_failed = has_failed || (is_news && state_ == DeviceState::kFault);
   }

@@ -32,6 +32,7 @@ class DobotRobot final : public Robot {
   void disable() noexcept override;
   void clear_fault() override;
   void move_to(const Positions& target, double settle_s) override;
+  /// Way-points in the controller's queue behind the one under way.
   std::size_t look_ahead() const override { return kLookAhead; }
   Status status() override;
   double expected_arrival_s() override;
@@ -75,6 +76,7 @@ class DobotRobot final : public Robot {
   DobotFrame frame_;
   bool is_target_current_ = false, is_in_position_ = false;
   DobotJoints target_{};
+  std::size_t queued_ = 0;  ///< targets since it was in position, or stopped
   double settle_s_ = 0;
   std::uint64_t accepted_ms_ = 0;  ///< controller's time of the last frame before the target was accepted
   double rest_ms_ = -1;            ///< controller's time since when it rests at the target; negative: it doesn't

@@ -48,12 +48,19 @@ template <std::size_t N>
 void DriveGroup<N>::set_fault(const std::string& sentence) {
   {
     const std::lock_guard lock(mutex_);
-    is_target_current_ = is_in_position_ = false;
+    forget_target();
     if (state_ == DeviceState::kFault || state_ == DeviceState::kDisconnected) return;
     state_ = DeviceState::kFault;
     fault_ = sentence;
   }
   clock_.wake();
+}
+
+/// Under the lock. What a drive holds ahead is forgotten with the target: the next order is sent whole.
+template <std::size_t N>
+void DriveGroup<N>::forget_target() {
+  is_target_current_ = is_in_position_ = false;
+  ahead_.reset();
 }
 
 template <std::size_t N>
@@ -65,7 +72,7 @@ void DriveGroup<N>::connect() {
   {
     const std::lock_guard lock(mutex_);
     fault_.clear();
-    is_target_current_ = is_in_position_ = false;
+    forget_target();
     for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_ours(readings[i].position);
     state_ = DeviceState::kConnected;
   }
@@ -189,7 +196,7 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
   const std::unique_lock command(command_mutex_, deadline_in(1));
   if (!command) throw DriverError("the " + name_ + " is busy");
   std::array<AxisDrive::Move, N> moves;
-  std::array<bool, N> is_new{};
+  std::array<bool, N> is_new{}, is_ahead{};
   {
     const std::lock_guard lock(mutex_);
     if (state_ != DeviceState::kReady) refuse("moved");
@@ -197,7 +204,10 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
     for (std::size_t i = 0; i < N; ++i) {
       moves[i] = order(i, target[i]);
       is_new[i] = !is_in_position_ || moves[i].target != target_[i].target;
+      is_ahead[i] = ahead_ && ahead_->is_written[i] && ahead_->moves[i] == moves[i];
     }
+    // An order to stay, which only settles anew, leaves what is ahead for the move that will follow.
+    if (std::find(is_new.begin(), is_new.end(), true) != is_new.end()) ahead_.reset();
     arrival_s_ = clock_.now_s() + travel_s(target) + settle_s;
     target_ = moves;
     settle_s_ = settle_s;
@@ -209,7 +219,7 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
   try {
     for (std::size_t i = 0; i < N; ++i) {
       if (give_up()) throw DriverError("the " + name_ + " was stopped");
-      if (is_new[i]) drives_[i]->start(moves[i], give_up);
+      if (is_new[i]) drives_[i]->start(moves[i], is_ahead[i], give_up);
     }
   } catch (const LinkError& error) {
     set_fault(error.what());
@@ -224,6 +234,46 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
   accepted_s_ = clock_.now_s();
   is_poll_due_ = true;
   poll_asked_.notify_all();
+}
+
+template <std::size_t N>
+void DriveGroup<N>::prepare(const Positions& target) {
+  check_bounds(target);
+  const std::lock_guard lock(mutex_);
+  if (state_ != DeviceState::kReady || !is_in_position_) return;
+  Ahead ahead;
+  for (std::size_t i = 0; i < N; ++i) ahead.moves[i] = order(i, target[i]);
+  if (ahead_ && ahead_->moves == ahead.moves) return;
+  ahead_ = ahead;
+  is_poll_due_ = true;
+  poll_asked_.notify_all();
+}
+
+/// Polling thread. A drive that does not take it is no fault here: the move itself is then sent whole, and meets the
+/// same drive.
+template <std::size_t N>
+void DriveGroup<N>::write_ahead() {
+  const std::unique_lock command(command_mutex_, deadline_in(0));
+  if (!command) return;
+  const auto give_up = [this] { return stops_waiting_.load() > 0; };
+  for (std::size_t i = 0; i < N && !give_up(); ++i) {
+    AxisDrive::Move move;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!ahead_ || ahead_->is_written[i]) continue;
+      move = ahead_->moves[i];
+      if (move.target == target_[i].target) continue;  // it will not move
+    }
+    bool is_written = false;
+    try {
+      is_written = drives_[i]->write_ahead(move, give_up);
+    } catch (const DriverError&) {
+      is_written = false;
+    }
+    const std::lock_guard lock(mutex_);
+    if (!is_written) ahead_.reset();
+    if (ahead_ && ahead_->moves[i] == move) ahead_->is_written[i] = true;
+  }
 }
 
 template <std::size_t N>
@@ -251,7 +301,7 @@ void DriveGroup<N>::stop() noexcept {
   {
     const std::lock_guard lock(mutex_);
     if (state_ == DeviceState::kDisconnected || state_ == DeviceState::kConnected) return;
-    is_target_current_ = is_in_position_ = false;
+    forget_target();
   }
   ++stops_waiting_;
   std::string failure;
@@ -355,8 +405,10 @@ void DriveGroup<N>::poll() {
     if (!is_polling_) return;
     is_poll_due_ = false;
     if (state_ == DeviceState::kFault) continue;
+    const bool has_ahead = ahead_.has_value();
     lock.unlock();
     try {
+      if (has_ahead) write_ahead();
       const double begun_s = clock_.now_s();
       take(read_all(), begun_s);
     } catch (const DriverError& error) {

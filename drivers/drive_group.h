@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,6 +22,9 @@ namespace hilbrush {
 /// (if it tells one) is the target, and its position is within the window, in every reading for the settle time; a
 /// reading counts only if it was begun after the order had been taken, so that what a drive still says of its last move
 /// doesn't.
+///
+/// prepare() leaves the next target to the polling thread, which writes ahead what starts nothing of the axes that will
+/// move; a move_to() of that very target then sends only the rest.
 template <std::size_t N>
 class DriveGroup final : public AxisGroup<N> {
  public:
@@ -38,6 +42,7 @@ class DriveGroup final : public AxisGroup<N> {
   void disable() noexcept override;
   void clear_fault() override;
   void move_to(const Positions& target, double settle_s) override;
+  void prepare(const Positions& target) override;
   Status status() override;
   double expected_arrival_s() override;
   void stop() noexcept override;
@@ -47,10 +52,17 @@ class DriveGroup final : public AxisGroup<N> {
 
  private:
   using Readings = std::array<AxisDrive::Reading, N>;
+  /// What prepare() was told, and which drives have it.
+  struct Ahead {
+    std::array<AxisDrive::Move, N> moves{};
+    std::array<bool, N> is_written{};
+  };
 
   void start_polling();
   void end_polling() noexcept;
   void poll();
+  void write_ahead();
+  void forget_target();
   Readings read_all();
   void take(const Readings& readings, double begun_s);
   bool is_at_target(const Readings& readings) const;
@@ -79,6 +91,7 @@ class DriveGroup final : public AxisGroup<N> {
   Positions positions_{};
   bool is_target_current_ = false, is_accepted_ = false, is_in_position_ = false;
   std::array<AxisDrive::Move, N> target_{};  ///< in steps
+  std::optional<Ahead> ahead_;               ///< of the next move; only while no axis moves
   double accepted_s_ = 0, settle_s_ = 0, arrival_s_ = 0;
   double rest_s_ = -1;  ///< since when it rests at the target, on the cell's clock; negative: it doesn't
   double in_position_since_s_ = 0;

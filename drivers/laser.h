@@ -29,6 +29,9 @@ class Laser {
   virtual void enable() = 0;
   /// Emission can't happen any more until enable(). From any thread, idempotent, never throws.
   virtual void disable() noexcept = 0;
+  /// What the next pulse needs and what can be set in the dark: told while the axes move. No light comes of it, and
+  /// fire() need not follow it. Executor's thread only. @throws DriverError if the device refuses or is lost
+  virtual void prepare(double /*power_w*/, double /*pulse_s*/) {}
   /// Starts one pulse; the device itself ends it after pulse_s, whatever happens to the caller. Executor's thread only.
   /// @throws DriverError if not enabled, outside limits(), interlock open, or still emitting.
   virtual void fire(double power_w, double pulse_s) = 0;

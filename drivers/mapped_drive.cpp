@@ -161,8 +161,16 @@ void MappedDrive::home(const GiveUp& give_up) {
   if (homes_to_zero_) run(map_.home, "homing", nullptr, give_up);
 }
 
-void MappedDrive::start(const Move& move, const GiveUp& give_up) {
-  if (is_stopped_.exchange(false)) run(map_.resume, "resuming after a stop", nullptr, give_up);
+bool MappedDrive::write_ahead(const Move& move, const GiveUp& give_up) {
+  if (map_.prepare.empty()) return false;
+  run(map_.prepare, "preparing a move", &move, give_up);
+  return true;
+}
+
+void MappedDrive::start(const Move& move, bool is_ahead, const GiveUp& give_up) {
+  const bool was_stopped = is_stopped_.exchange(false);
+  if (was_stopped) run(map_.resume, "resuming after a stop", nullptr, give_up);
+  if (!is_ahead || was_stopped) run(map_.prepare, "preparing a move", &move, give_up);
   run(map_.move, "starting a move", &move, give_up);
 }
 

@@ -37,7 +37,8 @@ class MappedDrive final : public AxisDrive {
   void enable(const GiveUp& give_up) override { run(map_.enable, "enabling", nullptr, give_up); }
   void disable() override;
   void home(const GiveUp& give_up) override;
-  void start(const Move& move, const GiveUp& give_up) override;
+  bool write_ahead(const Move& move, const GiveUp& give_up) override;
+  void start(const Move& move, bool is_ahead, const GiveUp& give_up) override;
   void stop() override;
   void clear_fault() override;
   std::string alarm_text(std::uint32_t alarm) const override;

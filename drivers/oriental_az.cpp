@@ -21,8 +21,8 @@ std::int32_t signed_at(std::span<const std::uint16_t, 4> words, std::size_t inde
 
 }  // namespace
 
-DirectData encode_move(const AxisDrive::Move& move) {
-  constexpr std::uint32_t kOperationData = 0, kAbsolute = 1, kFullCurrent = 1000, kTrigger = 1;
+DirectData encode_move(const AxisDrive::Move& move, Trigger trigger) {
+  constexpr std::uint32_t kOperationData = 0, kAbsolute = 1, kFullCurrent = 1000;
   DirectData data{};
   put(data, 0, kOperationData);
   put(data, 1, kAbsolute);
@@ -31,8 +31,13 @@ DirectData encode_move(const AxisDrive::Move& move) {
   put(data, 4, move.acceleration);
   put(data, 5, move.acceleration);
   put(data, 6, kFullCurrent);
-  put(data, 7, kTrigger);
+  put(data, 7, static_cast<std::uint32_t>(trigger));
   return data;
+}
+
+std::array<std::uint16_t, 2> encode_trigger(Trigger trigger) {
+  const auto value = static_cast<std::uint32_t>(trigger);
+  return {static_cast<std::uint16_t>(value >> 16), static_cast<std::uint16_t>(value & 0xFFFF)};
 }
 
 AxisDrive::Reading decode_reading(std::uint16_t output, std::span<const std::uint16_t, 4> position_words) {
@@ -45,35 +50,11 @@ AxisDrive::Reading decode_reading(std::uint16_t output, std::span<const std::uin
   return reading;
 }
 
-/// The commonest of the manual's list.
+/// The manual of the very drive says what it means.
 std::string alarm_text(std::uint32_t alarm) {
-  struct Known {
-    std::uint32_t code;
-    const char* meaning;
-  };
-  static constexpr Known kKnown[]{{0x10, "excessive position deviation"},
-                                  {0x20, "overcurrent"},
-                                  {0x21, "main circuit overheat"},
-                                  {0x22, "overvoltage"},
-                                  {0x25, "undervoltage"},
-                                  {0x26, "motor overheat"},
-                                  {0x28, "sensor error"},
-                                  {0x30, "overload"},
-                                  {0x31, "overspeed"},
-                                  {0x41, "EEPROM error"},
-                                  {0x4A, "home is not known"},
-                                  {0x60, "both limit sensors"},
-                                  {0x66, "hardware overtravel"},
-                                  {0x67, "software overtravel"},
-                                  {0x68, "stopped by its safety input"},
-                                  {0x70, "operation data error"},
-                                  {0x84, "RS-485 communication error"},
-                                  {0x85, "RS-485 communication timeout"}};
-  char code[24];
-  std::snprintf(code, sizeof code, "alarm 0x%02X", alarm);
-  for (const Known& known : kKnown)
-    if (known.code == alarm) return std::string(code) + " (" + known.meaning + ")";
-  return code;
+  char text[60];
+  std::snprintf(text, sizeof text, "alarm 0x%02X (see the drive's manual)", alarm);
+  return text;
 }
 
 }  // namespace oriental_az
@@ -147,9 +128,16 @@ void OrientalDrive::home(const GiveUp& give_up) {
   throw DriverError("the axis does not finish homing");
 }
 
-void OrientalDrive::start(const Move& move, const GiveUp&) {
+/// The write says itself that nothing starts, whatever the drive's trigger was left at.
+bool OrientalDrive::write_ahead(const Move& move, const GiveUp&) {
+  bus_->write(unit_, kDirectDataAt, encode_move(move, Trigger::kNone));
+  return true;
+}
+
+void OrientalDrive::start(const Move& move, bool is_ahead, const GiveUp&) {
+  if (is_ahead && !is_stop_held_) return bus_->write(unit_, kTriggerAt, encode_trigger(Trigger::kAllData));
   if (is_stop_held_) set_inputs(0);
-  bus_->write(unit_, kDirectDataAt, encode_move(move));
+  bus_->write(unit_, kDirectDataAt, encode_move(move, Trigger::kAllData));
 }
 
 /// The level stays until the next move, so that nobody else's order moves the axis meanwhile.

@@ -11,12 +11,14 @@
 #include "drivers/modbus_bus.h"
 
 /// Oriental Motor AZ drives by "direct data operation": one write of 16 registers carries target, speed, rates and the
-/// trigger that starts the move. 32-bit values have their high word first.
+/// trigger that starts the move; or one write carries them with the trigger at 0, and a second, of the trigger alone,
+/// starts it later. 32-bit values have their high word first.
 namespace hilbrush {
 
 namespace oriental_az {
 
 inline constexpr int kDirectDataAt = 0x0058;    ///< 16 words
+inline constexpr int kTriggerAt = 0x0066;       ///< the last 2 of them
 inline constexpr int kDriverInputAt = 0x007D;   ///< low word of 0x007C: level inputs
 inline constexpr int kDriverOutputAt = 0x007F;  ///< low word of 0x007E
 inline constexpr int kAlarmAt = 0x0080;         ///< 2 words
@@ -32,8 +34,10 @@ enum Output : std::uint16_t {
 };
 
 using DirectData = std::array<std::uint16_t, 16>;
-/// Operation data 0, absolute positioning, full current, trigger 1.
-DirectData encode_move(const AxisDrive::Move& move);
+enum class Trigger : std::uint32_t { kNone = 0, kAllData = 1 };
+/// Operation data 0, absolute positioning, full current.
+DirectData encode_move(const AxisDrive::Move& move, Trigger trigger);
+std::array<std::uint16_t, 2> encode_trigger(Trigger trigger);
 
 /// The two blocks that are polled. `position_words`: 4, from kPositionAt.
 AxisDrive::Reading decode_reading(std::uint16_t output, std::span<const std::uint16_t, 4> position_words);
@@ -54,7 +58,8 @@ class OrientalDrive final : public AxisDrive {
   void enable(const GiveUp& give_up) override;
   void disable() override;
   void home(const GiveUp& give_up) override;
-  void start(const Move& move, const GiveUp& give_up) override;
+  bool write_ahead(const Move& move, const GiveUp& give_up) override;
+  void start(const Move& move, bool is_ahead, const GiveUp& give_up) override;
   void stop() override;
   void clear_fault() override;
   std::string alarm_text(std::uint32_t alarm) const override { return oriental_az::alarm_text(alarm); }

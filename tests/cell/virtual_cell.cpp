@@ -360,14 +360,19 @@ void VirtualLaser::disable() noexcept {
   if (state_ == DeviceState::kReady || state_ == DeviceState::kEnabled) state_ = DeviceState::kConnected;
 }
 
-void VirtualLaser::fire(double power_w, double pulse_s) {
+void VirtualLaser::prepare(double power_w, double) {
   if (state_ != DeviceState::kReady) throw DriverError("the laser is not armed");
+  if (power_w == power_w_) return;
   link_.exchange([&] {
     if (power_w > devices_.cell().power_max_w()) return false;
     devices_.cell().set_power(power_w);
     power_w_ = power_w;
     return true;
   });
+}
+
+void VirtualLaser::fire(double power_w, double pulse_s) {
+  prepare(power_w, pulse_s);
   robot_.pulse(pulse_s);
 }
 

@@ -139,6 +139,7 @@ class VirtualLaser final : public Laser, private VirtualDevice {
   Limits limits() override;
   void enable() override;
   void disable() noexcept override;
+  void prepare(double power_w, double pulse_s) override;
   void fire(double power_w, double pulse_s) override;
   bool off() noexcept override;
   Status status() override;

@@ -136,7 +136,20 @@ TEST(RegisterMaps, RefusalsNameTheirPlace) {
             "map.json: $.registers.mode.address");
   EXPECT_EQ(refused_at([](Json& m) { m["registers"]["mode"]["words"] = 3; }), "map.json: $.registers.mode.words");
   EXPECT_EQ(refused_at([](Json& m) { m["stop"] = Json::array(); }), "map.json: $.stop");
-  EXPECT_EQ(refused_at([](Json& m) { m["move"] = m["stop"]; }), "map.json: $.move");
+  EXPECT_EQ(refused_at([](Json& m) { m.erase("prepare"); }), "map.json: $.move") << "no target";
+  const auto step = [](const char* text) { return Json::parse(text); };
+  EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"write": "mode", "value": 1})")); }),
+            "map.json: $.prepare");
+  EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"pause_ms": 1})")); }), "map.json: $.prepare");
+  EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"write": "controlword", "from": "speed"})")); }),
+            "map.json: $.prepare")
+      << "it starts moves";
+  EXPECT_EQ(refused_at([&](Json& m) {
+              m["registers"]["alias"] = step(R"({"address": "0x603F", "words": 2})");
+              m["prepare"].push_back(step(R"({"write": "alias", "from": "speed"})"));
+            }),
+            "map.json: $.prepare")
+      << "it shares a word with what starts moves";
   EXPECT_EQ(refused_at([](Json& m) { m["arrived"] = Json::array(); }), "map.json: $.arrived");
   EXPECT_EQ(refused_at([](Json& m) { m["fault"][0]["equals"] = "0x0010"; }), "map.json: $.fault[0].equals");
 }

@@ -2,7 +2,9 @@
 
 #include <cstdlib>
 #include <deque>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "tests/daemon/faulty_cell.h"
 #include "tests/daemon/witnessed_cell.h"
@@ -151,7 +153,7 @@ class BufferingRobot final : public Robot {
   void disable() noexcept override { robot_.disable(); }
   void clear_fault() override { robot_.clear_fault(); }
   std::size_t look_ahead() const override { return look_ahead_; }
-  void prepare(const Positions&, double) override {
+  void prepare(const Positions&) override {
     EXPECT_TRUE(waiting_.empty()) << "a set-point is prepared only at rest";
     ++prepared;
   }
@@ -228,6 +230,90 @@ TEST(ExecutorTest, HandsWayPointsAheadWhereOneChainMovesAlone) {
     elapsed_s[look_ahead / 2] = result.elapsed_s;
   }
   EXPECT_NEAR(elapsed_s[0], elapsed_s[1], .05 * elapsed_s[0]) << "the same way";
+}
+
+/// Counts what it is told ahead, and that it moves there next.
+class NotingTable final : public Table {
+ public:
+  explicit NotingTable(Table& table) : table_(table) {}
+  void connect() override { table_.connect(); }
+  void enable() override { table_.enable(); }
+  void home() override { table_.home(); }
+  void disable() noexcept override { table_.disable(); }
+  void clear_fault() override { table_.clear_fault(); }
+  void prepare(const Positions& target) override {
+    EXPECT_TRUE(table_.status().in_position);
+    EXPECT_NE(target, at_);
+    ahead_ = target;
+    ++prepared;
+  }
+  void move_to(const Positions& target, double settle_s) override {
+    if (target != at_ && ahead_) followed += *std::exchange(ahead_, {}) == target;
+    at_ = target;
+    table_.move_to(target, settle_s);
+  }
+  Status status() override { return table_.status(); }
+  double expected_arrival_s() override { return table_.expected_arrival_s(); }
+  void stop() noexcept override { table_.stop(); }
+  std::size_t prepared = 0, followed = 0;
+
+ private:
+  Table& table_;
+  Positions at_{};
+  std::optional<Positions> ahead_;
+};
+
+TEST(ExecutorTest, TellsTheTableItsNextTargetAlthoughTheArmMovesAloneFirst) {
+  const auto program = roundabout_program(60);
+  WitnessedCell world;
+  Journal journal = Journal::in_memory(60);
+  ExecutionControl control;
+  NotingTable table(world.cell().table);
+  const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
+                              world.description, journal, control);
+  ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  EXPECT_EQ(table.followed, table.prepared);
+  EXPECT_GE(table.followed, 5u);
+  expect_painted_once(program, journal, world.emissions());
+}
+
+/// The power is there before the axes are.
+class NotingLaser final : public Laser {
+ public:
+  explicit NotingLaser(Laser& laser) : laser_(laser) {}
+  void connect() override { laser_.connect(); }
+  Limits limits() override { return laser_.limits(); }
+  void enable() override { laser_.enable(); }
+  void disable() noexcept override { laser_.disable(); }
+  void prepare(double power_w, double) override {
+    EXPECT_FALSE(laser_.status().is_emitting);
+    power_w_ = power_w;
+  }
+  void fire(double power_w, double pulse_s) override {
+    EXPECT_EQ(power_w_, power_w);
+    power_w_ = 0;
+    laser_.fire(power_w, pulse_s);
+  }
+  bool off() noexcept override { return laser_.off(); }
+  Status status() override { return laser_.status(); }
+  void clear_fault() override { laser_.clear_fault(); }
+
+ private:
+  Laser& laser_;
+  double power_w_ = 0;
+};
+
+TEST(ExecutorTest, TellsTheLaserItsNextPowerWhileTheAxesMove) {
+  auto program = roundabout_program(40);
+  for (std::size_t i = 0; i < 40; ++i) program.exposures[i].power_w *= i % 2 == 0 ? 1.f : .5f;
+  WitnessedCell world;
+  Journal journal = Journal::in_memory(40);
+  ExecutionControl control;
+  NotingLaser laser(world.cell().laser);
+  const auto result = execute(program, {}, {world.cell().robot, world.cell().table, laser, world.cell().clock},
+                              world.description, journal, control);
+  ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
+  expect_painted_once(program, journal, world.emissions());
 }
 
 TEST(ExecutorTest, AStopForgetsWhatWasHandedAhead) {

@@ -21,6 +21,7 @@ enum class Place {
   kRobotArrival,
   kTableArrival,
   kPrepare,
+  kPower,
   kFire,
   kLaserStatus,
   kLaserOff,
@@ -28,8 +29,8 @@ enum class Place {
 };
 inline constexpr Place kPlaces[] = {Place::kRobotMove,   Place::kTableMove,    Place::kRobotStatus,
                                     Place::kTableStatus, Place::kRobotArrival, Place::kTableArrival,
-                                    Place::kPrepare,     Place::kFire,         Place::kLaserStatus,
-                                    Place::kLaserOff,    Place::kSleep};
+                                    Place::kPrepare,     Place::kPower,        Place::kFire,
+                                    Place::kLaserStatus, Place::kLaserOff,     Place::kSleep};
 
 enum class Kind {
   kThrows,         ///< the call fails with a DriverError and has no effect
@@ -110,9 +111,9 @@ class FaultyAxes final : public AxisGroup<N> {
     axes_.move_to(target, settle_s);
     fault_.strike_late(is_struck);
   }
-  void prepare(const Positions& target, double settle_s) override {
+  void prepare(const Positions& target) override {
     note(fault_.strikes(Place::kPrepare));
-    axes_.prepare(target, settle_s);
+    axes_.prepare(target);
   }
   Status status() override {
     note(fault_.strikes(N == 4 ? Place::kRobotStatus : Place::kTableStatus));
@@ -158,6 +159,11 @@ class FaultyLaser final : public Laser {
   Limits limits() override { return laser_.limits(); }
   void enable() override { laser_.enable(); }
   void disable() noexcept override { laser_.disable(); }
+  void prepare(double power_w, double pulse_s) override {
+    const bool is_struck = note(fault_.strikes(Place::kPower));
+    laser_.prepare(power_w, pulse_s);
+    fault_.strike_late(is_struck);
+  }
   void fire(double power_w, double pulse_s) override {
     const bool is_struck = note(fault_.strikes(Place::kFire));
     laser_.fire(power_w, pulse_s);

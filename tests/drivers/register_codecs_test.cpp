@@ -9,11 +9,16 @@ namespace hilbrush {
 namespace {
 
 TEST(OrientalAz, DirectDataIsSixteenWordsHighWordFirst) {
-  const auto words = oriental_az::encode_move({-25000, 100000, 1500000});
-  const oriental_az::DirectData wanted{0,    0,      0,    1,      0xFFFF, 0x9E58, 1, 0x86A0,
-                                       0x16, 0xE360, 0x16, 0xE360, 0,      1000,   0, 1};
+  using oriental_az::Trigger;
+  auto words = oriental_az::encode_move({-25000, 100000, 1500000}, Trigger::kAllData);
+  oriental_az::DirectData wanted{0, 0, 0, 1, 0xFFFF, 0x9E58, 1, 0x86A0, 0x16, 0xE360, 0x16, 0xE360, 0, 1000, 0, 1};
   EXPECT_EQ(words, wanted);
   EXPECT_EQ(oriental_az::kDirectDataAt, 0x58);
+  EXPECT_EQ(oriental_az::kTriggerAt, 0x66);
+  EXPECT_EQ(oriental_az::encode_trigger(Trigger::kAllData), (std::array<std::uint16_t, 2>{0, 1}));
+  wanted.back() = 0;
+  words = oriental_az::encode_move({-25000, 100000, 1500000}, Trigger::kNone);
+  EXPECT_EQ(words, wanted) << "the data of a move that nothing starts yet";
 }
 
 TEST(OrientalAz, ReadingsFollowTheDriversOutputBits) {
@@ -28,8 +33,8 @@ TEST(OrientalAz, ReadingsFollowTheDriversOutputBits) {
   reading = oriental_az::decode_reading(1 << 7, position);
   EXPECT_TRUE(reading.has_fault);
   EXPECT_FALSE(reading.is_enabled);
-  EXPECT_NE(oriental_az::alarm_text(0x30).find("overload"), std::string::npos);
-  EXPECT_EQ(oriental_az::alarm_text(0xABC), "alarm 0xABC");
+  EXPECT_EQ(oriental_az::alarm_text(0x30), "alarm 0x30 (see the drive's manual)");
+  EXPECT_EQ(oriental_az::alarm_text(0xABC), "alarm 0xABC (see the drive's manual)");
 }
 
 TEST(RegisterMap, WordsKeepTheirOrderAndSign) {

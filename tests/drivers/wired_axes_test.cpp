@@ -71,6 +71,33 @@ TEST_P(WiredAxes, StopOnTheWayAndGoOn) {
   move({.1, .3});
 }
 
+TEST_P(WiredAxes, NothingMovesByWhatIsWrittenAhead) {
+  WiredCell::make_ready(*table);
+  move({.1, .3});
+  const auto stay = [&] {
+    cell.clock.sleep_until(cell.clock.now_s() + 1);
+    EXPECT_TRUE(table->status().in_position);
+    cell.wire.act([&](TrueCell& truth) {
+      EXPECT_TRUE(truth.is_settled(kTilt) && truth.is_settled(kRotation));
+      EXPECT_NEAR(truth.position(kTilt), .1, 1e-5);
+      EXPECT_NEAR(truth.position(kRotation), .3, 1e-5);
+    });
+  };
+  table->prepare({.2, .5});
+  stay();
+  move({.2, .5});
+  move({.1, .3});
+  table->prepare({.2, .5});
+  stay();
+  table->stop();
+  cell.clock.sleep_until(cell.clock.now_s() + 1);
+  cell.wire.act([&](TrueCell& truth) { EXPECT_NEAR(truth.position(kRotation), .3, 1e-5); });
+  move({.15, .5});
+  move({.1, .3});
+  table->prepare({.2, .5});
+  move({.1, .4});
+}
+
 TEST_P(WiredAxes, RefuseWhatIsOutsideTheirLimits) {
   WiredCell::make_ready(*table);
   EXPECT_THROW(table->move_to({1.9, 0}, .02), DriverError);

@@ -1,0 +1,150 @@
+#pragma once
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace hilbrush::test {
+
+/// The other end of a Modbus TCP connection: registers that are read and written, and every write as it came over the
+/// wire, from the unit's number on. `obey` is told of each write, with all registers of its unit.
+class ModbusPeer {
+ public:
+  using Registers = std::map<int, std::uint16_t>;
+
+  explicit ModbusPeer(std::function<void(Registers&)> obey) : obey_(std::move(obey)) {
+    listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof at;
+    if (::bind(listener_, reinterpret_cast<sockaddr*>(&at), size) != 0 || ::listen(listener_, 4) != 0 ||
+        ::getsockname(listener_, reinterpret_cast<sockaddr*>(&at), &size) != 0)
+      throw std::runtime_error("no port for a Modbus peer");
+    port_ = ntohs(at.sin_port);
+    thread_ = std::thread([this] { serve(); });
+  }
+  ~ModbusPeer() {
+    ::shutdown(listener_, SHUT_RDWR);
+    {
+      const std::lock_guard lock(mutex_);
+      if (connection_ >= 0) ::shutdown(connection_, SHUT_RDWR);
+    }
+    thread_.join();
+    ::close(listener_);
+  }
+
+  std::uint16_t port() const { return port_; }
+  void set(int unit, int address, std::uint16_t word) {
+    const std::lock_guard lock(mutex_);
+    units_[unit][address] = word;
+  }
+  /// The writes since the last call, in hex.
+  std::vector<std::string> take_writes() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(writes_, {});
+  }
+  /// How many reads came after the last write: whoever made it has had its answer, or given it up.
+  std::size_t reads_since_write() {
+    const std::lock_guard lock(mutex_);
+    return reads_since_write_;
+  }
+  /// So many further writes get no answer, though they are obeyed.
+  void be_silent(int writes) {
+    const std::lock_guard lock(mutex_);
+    silent_writes_ = writes;
+  }
+
+ private:
+  void serve() {
+    for (;;) {
+      const int connection = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
+      if (connection < 0) return;
+      {
+        const std::lock_guard lock(mutex_);
+        connection_ = connection;
+      }
+      while (answer(connection)) {
+      }
+      const std::lock_guard lock(mutex_);
+      ::close(std::exchange(connection_, -1));
+    }
+  }
+
+  bool answer(int connection) {
+    std::array<std::uint8_t, 260> frame{};
+    constexpr std::size_t kHead = 6;
+    if (::recv(connection, frame.data(), kHead, MSG_WAITALL) != static_cast<ssize_t>(kHead)) return false;
+    const std::size_t length = frame[4] << 8 | frame[5];
+    if (length < 2 || length > frame.size() - kHead) return false;
+    if (::recv(connection, frame.data() + kHead, length, MSG_WAITALL) != static_cast<ssize_t>(length)) return false;
+    std::vector<std::uint8_t> reply(frame.begin(), frame.begin() + kHead + 2);
+    {
+      const std::lock_guard lock(mutex_);
+      if (!carry_out(frame, length, reply)) return true;
+    }
+    reply[4] = 0;
+    reply[5] = static_cast<std::uint8_t>(reply.size() - kHead);
+    return ::send(connection, reply.data(), reply.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(reply.size());
+  }
+
+  /// Under the lock. False: no answer.
+  bool carry_out(const std::array<std::uint8_t, 260>& frame, std::size_t length, std::vector<std::uint8_t>& reply) {
+    const auto word = [&](std::size_t i) { return static_cast<std::uint16_t>(frame[i] << 8 | frame[i + 1]); };
+    Registers& registers = units_[frame[6]];
+    const int address = word(8);
+    constexpr std::uint8_t kRead = 3, kWriteOne = 6;
+    if (frame[7] == kRead) {
+      ++reads_since_write_;
+      reply.push_back(static_cast<std::uint8_t>(2 * word(10)));
+      for (int i = 0; i < word(10); ++i) {
+        reply.push_back(static_cast<std::uint8_t>(registers[address + i] >> 8));
+        reply.push_back(static_cast<std::uint8_t>(registers[address + i] & 0xFF));
+      }
+      return true;
+    }
+    note_write(frame, length);
+    reads_since_write_ = 0;
+    if (frame[7] == kWriteOne)
+      registers[address] = word(10);
+    else
+      for (int i = 0; i < word(10); ++i) registers[address + i] = word(13 + 2 * static_cast<std::size_t>(i));
+    obey_(registers);
+    for (std::size_t i = 8; i < 12; ++i) reply.push_back(frame[i]);
+    return silent_writes_ <= 0 || silent_writes_-- <= 0;
+  }
+
+  void note_write(const std::array<std::uint8_t, 260>& frame, std::size_t length) {
+    std::string text;
+    char digits[4];
+    for (std::size_t i = 6; i < 6 + length; ++i) {
+      std::snprintf(digits, sizeof digits, "%02X", frame[i]);
+      text += (text.empty() ? "" : " ") + std::string(digits);
+    }
+    writes_.push_back(text);
+  }
+
+  const std::function<void(Registers&)> obey_;
+  int listener_ = -1;
+  std::uint16_t port_ = 0;
+  std::mutex mutex_;  ///< of what follows
+  int connection_ = -1, silent_writes_ = 0;
+  std::size_t reads_since_write_ = 0;
+  std::map<int, Registers> units_;
+  std::vector<std::string> writes_;
+  std::thread thread_;
+};
+
+}  // namespace hilbrush::test
