@@ -9,6 +9,7 @@ namespace hilbrush {
 namespace {
 
 constexpr std::uint64_t kFramesOfGrace = 4;  ///< until a frame must show an output that was confirmed off
+constexpr std::uint64_t kOverdueMs = 16;     ///< two frames: how finely a controller may divide its time
 constexpr double kPulseMaxS = 60;
 constexpr double kImpatientS = 0.005;  ///< wall
 
@@ -40,9 +41,13 @@ bool DobotRobot::OutputGate::is_busy() const {
   return is_pulsing_ || (is_known_off_ && robot_.frame_count_ < known_frame_ + kFramesOfGrace);
 }
 
-bool DobotRobot::OutputGate::agrees_with(const DobotFrame& frame) {
+const char* DobotRobot::OutputGate::fault_in(const DobotFrame& frame) {
   const bool is_lit = (frame.digital_outputs >> (output_ - 1) & 1) != 0;
-  return !is_lit || !is_known_off_ || robot_.frame_count_ < known_frame_ + kFramesOfGrace;
+  if (!is_lit) return nullptr;
+  if (is_known_off_ && robot_.frame_count_ >= known_frame_ + kFramesOfGrace) return "is on though nobody ordered it";
+  if (!is_pulsing_) return nullptr;
+  if (!lit_ms_) lit_ms_ = frame.time_ms;
+  return frame.time_ms > *lit_ms_ + pulse_ms_ + kOverdueMs ? "is on longer than its pulse" : nullptr;
 }
 
 void DobotRobot::OutputGate::pulse(double pulse_s) {
@@ -57,6 +62,8 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
     if (is_pulsing_) throw DriverError("the robot refuses a pulse: the last one is not over");
     is_pulsing_ = true;
     is_known_off_ = false;
+    pulse_ms_ = static_cast<std::uint64_t>(pulse_ms);
+    lit_ms_.reset();
   }
   const auto commands = encode_dobot_pulse(output_, pulse_ms);
   try {

@@ -1,5 +1,7 @@
 #pragma once
+#include <cstdint>
 #include <functional>
+#include <optional>
 
 #include "drivers/clock.h"
 #include "drivers/dobot_robot.h"
@@ -18,8 +20,9 @@ class DobotRobot::OutputGate final : public Gate {
   bool is_on() override;
   void set_listener(Listener listener) override;
 
-  /// Reader's thread, under the robot's mutex: false if the output is on though nobody ordered it.
-  bool agrees_with(const DobotFrame& frame);
+  /// Reader's thread, under the robot's mutex: what is wrong if the output is on though nobody ordered it, or longer
+  /// than its pulse; else nothing.
+  const char* fault_in(const DobotFrame& frame);
   bool is_pulsing() const { return is_pulsing_; }  ///< under the robot's mutex
   /// A pulse is queued or just over, so that the controller may still call itself running. Under the robot's mutex.
   bool is_busy() const;
@@ -34,9 +37,11 @@ class DobotRobot::OutputGate final : public Gate {
   DobotRobot& robot_;
   const int output_;
   Listener listener_;
-  bool is_pulsing_ = false;        ///< ordered and not confirmed over; under the robot's mutex, like the rest
-  bool is_known_off_ = false;      ///< confirmed by the controller, and nothing ordered since
-  std::uint64_t known_frame_ = 0;  ///< frames that had come by then
+  bool is_pulsing_ = false;              ///< ordered and not confirmed over; under the robot's mutex, like the rest
+  bool is_known_off_ = false;            ///< confirmed by the controller, and nothing ordered since
+  std::uint64_t known_frame_ = 0;        ///< frames that had come by then
+  std::uint64_t pulse_ms_ = 0;           ///< of the pulse that is not over
+  std::optional<std::uint64_t> lit_ms_;  ///< controller's time of the first frame that showed it on
 };
 
 }  // namespace hilbrush

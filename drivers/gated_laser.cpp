@@ -63,12 +63,16 @@ void GatedLaser::disable() noexcept {
   head_->disarm();
 }
 
-void GatedLaser::fire(double power_w, double pulse_s) {
+void GatedLaser::check_ready() {
   const Status now = status();
   if (now.state != DeviceState::kReady)
     throw DriverError(std::string("the laser cannot be fired: it is ") + device_state_name(now.state) +
                       (now.fault.empty() ? "" : ": " + now.fault));
   if (!now.interlock_closed) throw DriverError("the laser cannot be fired: its interlock is open");
+}
+
+/// A gate that counts in whole steps gets the next longer one, at the power that keeps the energy.
+GatedLaser::Timed GatedLaser::timed(double power_w, double pulse_s) const {
   if (!is_within(power_w, limits_.power_min_w, limits_.power_max_w) ||
       !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s)) {
     char text[200];
@@ -79,17 +83,34 @@ void GatedLaser::fire(double power_w, double pulse_s) {
         limits_.pulse_max_s * 1e3);
     throw DriverError(text);
   }
-  // A gate that counts in whole steps gets the next longer one, at the power that keeps the energy.
   const double step_s = gate_.resolution_s();
   const double timed_s = step_s > 0 ? std::max(1., std::ceil(pulse_s / step_s - 1e-3)) * step_s : pulse_s;
-  head_->set_power(std::max(power_w * pulse_s / timed_s, limits_.power_min_w));
+  return {std::max(power_w * pulse_s / timed_s, limits_.power_min_w), timed_s};
+}
+
+void GatedLaser::prepare(double power_w, double pulse_s) {
+  check_ready();
+  head_->set_power(timed(power_w, pulse_s).power_w);
+}
+
+void GatedLaser::fire(double power_w, double pulse_s) {
+  check_ready();
+  const Timed pulse = timed(power_w, pulse_s);
+  head_->set_power(pulse.power_w);
   if (!may_fire_) throw DriverError("the laser cannot be fired: it was disabled");
   {
     const std::lock_guard lock(mutex_);
     is_reading_due_ = true;
     gate_dark_s_ = -1;
   }
-  gate_.pulse(timed_s);
+  try {
+    head_->begin_pulse(pulse.pulse_s);
+    gate_.pulse(pulse.pulse_s);
+  } catch (const DriverError&) {
+    // A gate that refused had nothing to end, and says nothing of it.
+    if (gate_.off()) note_dark();
+    throw;
+  }
 }
 
 /// Any thread.
@@ -99,6 +120,7 @@ void GatedLaser::note_dark() {
     if (!is_reading_due_ || gate_dark_s_ >= 0) return;
     gate_dark_s_ = clock_.now_s();
   }
+  head_->end_pulse();  // before anybody can begin the next
   head_->look();
 }
 

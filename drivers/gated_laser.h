@@ -25,6 +25,8 @@ class GatedLaser final : public Laser {
   Limits limits() override { return limits_; }
   void enable() override;
   void disable() noexcept override;
+  /// Sets the head's power while the gate is shut.
+  void prepare(double power_w, double pulse_s) override;
   void fire(double power_w, double pulse_s) override;
   bool off() noexcept override;
   Status status() override;
@@ -34,6 +36,12 @@ class GatedLaser final : public Laser {
   LaserHead& head() { return *head_; }
 
  private:
+  /// A pulse as the gate can time it.
+  struct Timed {
+    double power_w, pulse_s;
+  };
+  Timed timed(double power_w, double pulse_s) const;
+  void check_ready();
   void check_powers();
   void note_dark();
   void note_reading();

@@ -9,7 +9,7 @@
 namespace hilbrush::guard {
 namespace {
 
-constexpr std::array<std::pair<const char*, Verb>, 10> kVerbs{{{"connect", Verb::kConnect},
+constexpr std::array<std::pair<const char*, Verb>, 12> kVerbs{{{"connect", Verb::kConnect},
                                                                {"identify", Verb::kIdentify},
                                                                {"powers", Verb::kPowers},
                                                                {"arm", Verb::kArm},
@@ -18,10 +18,12 @@ constexpr std::array<std::pair<const char*, Verb>, 10> kVerbs{{{"connect", Verb:
                                                                {"look", Verb::kLook},
                                                                {"clear", Verb::kClear},
                                                                {"pulse", Verb::kPulse},
-                                                               {"gate-off", Verb::kGateOff}}};
+                                                               {"gate-off", Verb::kGateOff},
+                                                               {"light", Verb::kLight},
+                                                               {"dark", Verb::kDark}}};
 
 bool has_value(Verb verb) {
-  return verb == Verb::kPower || verb == Verb::kPulse;
+  return verb == Verb::kPower || verb == Verb::kPulse || verb == Verb::kLight;
 }
 
 /// Cuts the first word off.

@@ -13,12 +13,14 @@ namespace hilbrush::guard {
 
 inline constexpr std::size_t kMessageMax = 4096;
 
-enum class Verb { kConnect, kIdentify, kPowers, kArm, kDisarm, kPower, kLook, kClear, kPulse, kGateOff };
+/// kLight: a gate that is not the laser's own opens, and will be reported shut by kDark within `value` seconds. These
+/// two and kLook get no reply.
+enum class Verb { kConnect, kIdentify, kPowers, kArm, kDisarm, kPower, kLook, kClear, kPulse, kGateOff, kLight, kDark };
 
 struct Request {
   std::uint32_t number = 0;
   Verb verb = Verb::kLook;
-  double value = 0;  ///< W of kPower, s of kPulse
+  double value = 0;  ///< W of kPower, s of kPulse and kLight
 };
 std::string encode(const Request& request);
 std::optional<Request> decode_request(std::string_view message);

@@ -20,6 +20,7 @@ using Steady = std::chrono::steady_clock;
 constexpr double kStatusS = 0.05;  ///< wall: the guard's own sign of life
 constexpr double kDarkenRetryS = 0.1;
 constexpr int kDarkenAttempts = 50;  ///< on the way out
+constexpr double kLightMaxS = 120;   ///< longer than any pulse
 
 int milliseconds_until(Deadline deadline) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Steady::now()).count();
@@ -105,7 +106,8 @@ GuardServer::End GuardServer::run() {
   std::optional<End> end;
   while (!end) {
     std::array<pollfd, 2> polled{pollfd{channel_, POLLIN, 0}, pollfd{signals_, POLLIN, 0}};
-    const Deadline next = has_beaten_ ? std::min(beat_deadline, status_deadline) : status_deadline;
+    Deadline next = has_beaten_ ? std::min(beat_deadline, status_deadline) : status_deadline;
+    if (dark_deadline_) next = std::min(next, *dark_deadline_);
     const int ready = ::poll(polled.data(), polled.size(), milliseconds_until(next));
     if (ready > 0 && polled[1].revents != 0) end = End::kSignal;
     if (ready > 0 && polled[0].revents != 0 && !end) {
@@ -120,6 +122,10 @@ GuardServer::End GuardServer::run() {
       has_beaten_ = false;  // the watch begins anew when the user is heard again
       trip("the laser's guard heard nothing of its user for " + std::to_string(std::lround(allowance_s * 1e3)) +
            " ms and turned the laser off");
+    }
+    if (dark_deadline_ && Steady::now() >= *dark_deadline_) {
+      dark_deadline_.reset();
+      trip("the laser's guard was not told in time that a pulse was over and turned the laser off");
     }
     if (Steady::now() >= status_deadline) {
       status_deadline = deadline_in(kStatusS);
@@ -152,6 +158,11 @@ std::optional<GuardServer::End> GuardServer::read_channel() {
 
 void GuardServer::obey_at_once(const guard::Request& request) {
   if (request.verb == guard::Verb::kLook) return head_.look();
+  if (request.verb == guard::Verb::kDark) return dark_deadline_.reset();
+  if (request.verb == guard::Verb::kLight) {
+    dark_deadline_ = deadline_in(std::clamp(request.value, 0., kLightMaxS));
+    return;
+  }
   if (request.verb == guard::Verb::kDisarm || request.verb == guard::Verb::kGateOff) {
     {
       const std::lock_guard lock(mutex_);
@@ -241,6 +252,8 @@ std::string GuardServer::carry_out(const guard::Request& request) {
     case guard::Verb::kDisarm:
     case guard::Verb::kLook:
     case guard::Verb::kGateOff:
+    case guard::Verb::kLight:
+    case guard::Verb::kDark:
       break;  // obeyed at once
   }
   return {};

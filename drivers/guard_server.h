@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -10,13 +11,15 @@
 #include "drivers/gate.h"
 #include "drivers/guard_codec.h"
 #include "drivers/laser_head.h"
+#include "drivers/link.h"
 
 namespace hilbrush {
 
 /// The guard's side of the channel: obeys requests, and disarms the laser by itself when heartbeats are missing, when
-/// the channel ends, when it carries garbage, or when a signal asks the guard to end. A missing heartbeat latches until
-/// the user clears it. Requests that wait for the laser run on a thread of their own, so that heartbeats are always
-/// heard; disarming and shutting the gate don't wait for them.
+/// the channel ends, when it carries garbage, when the end of a pulse that was announced is not reported in time, or
+/// when a signal asks the guard to end. A missing heartbeat, and a missing end, latch until the user clears them.
+/// Requests that wait for the laser run on a thread of their own, so that heartbeats are always heard; disarming and
+/// shutting the gate don't wait for them.
 class GuardServer {
  public:
   enum class End { kChannelEnded, kGarbage, kSignal };
@@ -59,7 +62,8 @@ class GuardServer {
   std::string trip_;  ///< why it disarmed by itself; empty if it didn't, or was cleared
   std::uint64_t looks_ = 0;
   bool is_ending_ = false;
-  bool has_beaten_ = false;  ///< the watch begins with the first heartbeat
+  bool has_beaten_ = false;                ///< the watch begins with the first heartbeat
+  std::optional<Deadline> dark_deadline_;  ///< of the pulse that was announced; run()'s thread
   std::atomic<bool> is_disarmed_{true};
   std::thread worker_;
 };

@@ -270,12 +270,30 @@ LaserHead::Status GuardedHead::status() {
   return status_;
 }
 
+/// What gets no reply.
+void GuardedHead::tell(guard::Verb verb, double value) {
+  const std::lock_guard lock(mutex_);
+  if (!lost_.empty()) throw LinkError(lost_);
+  send(guard::encode(guard::Request{next_number_++, verb, value}));
+}
+
 void GuardedHead::look() {
   try {
-    const std::lock_guard lock(mutex_);
-    send(guard::encode(guard::Request{next_number_++, guard::Verb::kLook, 0}));
+    tell(guard::Verb::kLook, 0);
   } catch (const DriverError&) {
     // The thread that listens to the guard notices the same.
+  }
+}
+
+void GuardedHead::begin_pulse(double pulse_s) {
+  tell(guard::Verb::kLight, clock_.wall_s(pulse_s) + options_.pulse_grace_s);
+}
+
+void GuardedHead::end_pulse() noexcept {
+  try {
+    tell(guard::Verb::kDark, 0);
+  } catch (const std::exception&) {
+    // A guard that can't be told turns emission off, which is as safe.
   }
 }
 

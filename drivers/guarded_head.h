@@ -21,8 +21,9 @@ class GuardedHead final : public LaserHead {
  public:
   struct Options {
     double heartbeat_s = 0.02;
-    double silence_s = 0.5;     ///< wall: a guard that says nothing for so long is lost
-    double arm_timeout_s = 30;  ///< cell: what the guard's own arming may take
+    double silence_s = 0.5;      ///< wall: a guard that says nothing for so long is lost
+    double arm_timeout_s = 30;   ///< cell: what the guard's own arming may take
+    double pulse_grace_s = 0.2;  ///< wall: later than that after its time a pulse's end ends emission
   };
   /// Starts (again) a guard; returns this side's end of its channel. @throws DriverError
   using Launch = std::function<int()>;
@@ -38,6 +39,8 @@ class GuardedHead final : public LaserHead {
   void set_power(double power_w) override;
   Status status() override;
   void look() override;
+  void begin_pulse(double pulse_s) override;
+  void end_pulse() noexcept override;
   void clear_fault() override;
   void set_listener(std::function<void()> on_change) override { on_change_ = std::move(on_change); }
 
@@ -54,6 +57,7 @@ class GuardedHead final : public LaserHead {
   void lose(const std::string& sentence);
   std::string request(guard::Verb verb, double value, double wall_s);
   void send(const std::string& message);
+  void tell(guard::Verb verb, double value);
 
   const Launch launch_;
   const Options options_;

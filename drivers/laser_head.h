@@ -37,6 +37,11 @@ class LaserHead {
   /// Asks for a reading as soon as the link is free, and returns. From any thread.
   virtual void look() = 0;
   virtual void clear_fault() = 0;
+  /// A pulse of another device's gate is about to begin, or is confirmed over: a head that outlives its user turns
+  /// emission off if it hears of no end. The first throws DriverError if nobody would watch; the second is from any
+  /// thread.
+  virtual void begin_pulse(double /*pulse_s*/) {}
+  virtual void end_pulse() noexcept {}
   /// Called from any thread when status() has changed or a reading came that look() had asked for. Set once.
   virtual void set_listener(std::function<void()> on_change) = 0;
 };

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <string>
@@ -190,6 +191,31 @@ TEST_F(GuardTest, AMissedHeartbeatLatchesUntilItIsCleared) {
   EXPECT_TRUE(is_emission_ordered());
 }
 
+TEST_F(GuardTest, APulseThatIsNotReportedOverInTimeEndsEmissionAndLatches) {
+  start();
+  arm();
+  say(guard::encode(guard::Request{++number, guard::Verb::kLight, .1}));
+  const auto deadline = Steady::now() + std::chrono::seconds(5);
+  while (is_emission_ordered() && Steady::now() < deadline) beat();
+  EXPECT_FALSE(is_emission_ordered());
+  const guard::Reply refusal = ask(guard::Verb::kArm);
+  EXPECT_NE(refusal.text.find("was not told in time that a pulse was over"), std::string::npos) << refusal.text;
+  ASSERT_EQ(refusal_of(guard::Verb::kClear), "");
+  EXPECT_TRUE(ask(guard::Verb::kArm).is_ok);
+}
+
+TEST_F(GuardTest, APulseThatIsReportedOverDisturbsNothing) {
+  start();
+  arm();
+  say(guard::encode(guard::Request{++number, guard::Verb::kLight, .2}));
+  say(guard::encode(guard::Request{++number, guard::Verb::kDark, 0}));
+  for (int i = 0; i < 40; ++i) {
+    beat();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(is_emission_ordered());
+}
+
 TEST_F(GuardTest, GarbageOnTheChannelDisarmsAndEnds) {
   for (const std::string& garbage : {std::string("17 pulse much"), std::string(), std::string("\0\xff\n", 3),
                                      std::string(guard::kMessageMax + 500, 'x'), std::string("1 arm now")}) {
@@ -316,6 +342,39 @@ TEST_F(GuardedHeadTest, FiresLikeAHeadInTheSameProcess) {
   EXPECT_EQ(laser->status().state, DeviceState::kReady) << laser->status().fault;
   EXPECT_EQ(world.emissions().size(), 3u);
   EXPECT_EQ(laser->identify().back(), "guarded by a process of its own");
+}
+
+/// Takes pulses and never says that one is over.
+class StuckGate final : public Gate {
+ public:
+  double resolution_s() const override { return 0; }
+  void pulse(double) override { is_on_ = true; }
+  bool off() noexcept override { return !is_on_; }
+  bool is_on() override { return is_on_; }
+  void set_listener(Listener) override {}
+
+ private:
+  std::atomic<bool> is_on_{false};
+};
+
+TEST_F(GuardedHeadTest, AGateThatNeverReportsAPulsesEndEndsEmission) {
+  StuckGate gate;
+  const GuardArguments arguments{"obis", false, world.laser_options(), world.clock.wall_s(1)};
+  auto launch = [&] { return process->start(guard_program(), to_command_line(arguments)); };
+  GatedLaser stuck(std::make_unique<GuardedHead>(launch, GuardedHead::Options{}, world.clock), gate,
+                   world.laser_limits(), world.clock);
+  stuck.connect();
+  stuck.enable();
+  const auto is_armed = [&] {
+    bool is_ordered = false;
+    world.wire.act([&](TrueCell& cell) { is_ordered = cell.is_emission_ordered(); });
+    return is_ordered;
+  };
+  ASSERT_TRUE(is_armed());
+  stuck.fire(.05, .005);
+  EXPECT_TRUE(world.wait_for([&] { return !is_armed(); }, 60));
+  EXPECT_TRUE(world.wait_for([&] { return stuck.status().state == DeviceState::kFault; }));
+  EXPECT_NE(stuck.status().fault.find("pulse was over"), std::string::npos) << stuck.status().fault;
 }
 
 TEST_F(GuardedHeadTest, ALostGuardIsAFaultThatClearingMends) {

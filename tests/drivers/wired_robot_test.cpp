@@ -43,6 +43,15 @@ TEST_F(WiredRobot, TakesTargetsAheadAndArrivesAtTheLast) {
   cell.wire.act([&](TrueCell& truth) { EXPECT_TRUE(truth.is_settled(kJ1)); });
 }
 
+TEST_F(WiredRobot, RefusesMoreTargetsAheadThanItSays) {
+  for (std::size_t i = 0; i <= cell.robot->look_ahead(); ++i)
+    cell.robot->move_to(beside(.3 + .01 * static_cast<double>(i)), .02);
+  EXPECT_THROW(cell.robot->move_to(beside(.1), .02), DriverError);
+  cell.robot->stop();
+  cell.robot->move_to(beside(.1), .02);
+  EXPECT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+}
+
 TEST_F(WiredRobot, AStopForgetsWhatWasAhead) {
   for (const double step : {.5, -.5}) cell.robot->move_to(beside(step), .02);
   ASSERT_TRUE(cell.wait_for([&] { return is_robot_moving(); }));
@@ -105,6 +114,52 @@ TEST_F(WiredRobot, APulseNeedsARobotInPosition) {
   EXPECT_THROW(gate.pulse(0), DriverError);
   EXPECT_THROW(gate.pulse(1e9), DriverError);
   EXPECT_FALSE(gate.is_on());
+}
+
+TEST_F(WiredRobot, TheNextPowerIsSetInTheDark) {
+  EXPECT_THROW(cell.laser->prepare(.03, .005), DriverError) << "it is not armed";
+  cell.laser->enable();
+  cell.robot->move_to(beside(.5), .02);
+  cell.laser->prepare(.03, .005);
+  cell.wire.act([](TrueCell& truth) {
+    EXPECT_NEAR(truth.power_w(), .03, 1e-6);
+    EXPECT_FALSE(truth.is_emitting());
+  });
+  EXPECT_THROW(cell.laser->prepare(100, .005), DriverError);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  EXPECT_TRUE(cell.emissions().empty());
+}
+
+TEST_F(WiredRobot, APulseThatItRefusesLeavesNothingBehind) {
+  cell.laser->enable();
+  cell.robot->move_to(beside(.5), .02);
+  EXPECT_THROW(cell.laser->fire(.05, .005), DriverError) << "under way";
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  ASSERT_TRUE(cell.wait_for([&] { return cell.laser->status().state == DeviceState::kReady; }));
+  EXPECT_FALSE(cell.laser->status().is_emitting);
+  cell.laser->fire(.05, .005);
+  ASSERT_TRUE(cell.wait_for([&] { return !cell.laser->status().is_emitting; }));
+  EXPECT_EQ(cell.emissions().size(), 1u);
+}
+
+/// The controller takes the on and the wait, and neither hears nor answers the rest.
+TEST_F(WiredRobot, ALostEndOfAPulseIsSeenInTheFrames) {
+  cell.laser->enable();
+  cell.robot->move_to(beside(.01), .02);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
+  WireFault fault;
+  fault.kind = WireFaultKind::kLostRequest;
+  fault.device = WireDevice::kRobot;
+  fault.trigger.at_message = cell.wire.message_count(WireDevice::kRobot) + 3;
+  fault.messages = 2;
+  cell.wire.add_fault(fault);
+  EXPECT_THROW(cell.laser->fire(.05, .005), DriverError);
+  EXPECT_NE(cell.robot->status().fault.find("is on longer than its pulse"), std::string::npos)
+      << cell.robot->status().fault;
+  cell.wire.act([](TrueCell& truth) { EXPECT_FALSE(truth.is_gate_open()); });
+  ASSERT_EQ(cell.emissions().size(), 1u);
+  // Without it, an answer would be waited for ten seconds of this cell.
+  EXPECT_LT(cell.emissions()[0].length_s, 5);
 }
 
 TEST_F(WiredRobot, OffEndsAPulseAndWhatIsQueuedOfIt) {
