@@ -1,6 +1,9 @@
 #include "drivers/modbus_bus.h"
 
+#include <fcntl.h>
 #include <modbus.h>
+#include <sys/select.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
@@ -21,6 +24,14 @@ bool is_exception(int error) {
 bool is_hang_up(int error) {
   return error == ECONNRESET || error == EPIPE || error == EBADF || error == ECONNREFUSED || error == EIO ||
          error == ENOTCONN || error == ENXIO;
+}
+
+/// libmodbus waits by select(), which knows no descriptor beyond FD_SETSIZE and would end the program.
+void check_descriptors(const std::string& name) {
+  const int next = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  if (next >= 0) ::close(next);
+  if (next < 0 || next >= FD_SETSIZE)
+    throw LinkError(name + ": can't be connected: this process has too many files and clients open");
 }
 
 std::string words_text(std::span<const std::uint16_t> words) {
@@ -51,6 +62,7 @@ ModbusBus::~ModbusBus() {
 void ModbusBus::connect() {
   close();
   const std::lock_guard lock(mutex_);
+  check_descriptors(name_);
   const ModbusEndpoint& at = endpoint_;
   context_ = at.host.empty() ? modbus_new_rtu(at.port.c_str(), at.baud, at.parity, 8, 1)
                              : modbus_new_tcp_pi(at.host.c_str(), std::to_string(at.tcp_port).c_str());

@@ -2,6 +2,7 @@
 // same program on the cell in process; whose time a dot takes; and how long a stop takes until the light is off.
 //
 //   wire_bench [STOPS]                        a generated program of 150 dots, 60 of them in real time, 40 stops
+//   wire_bench ahead                              what is gained by what devices are told ahead, in real time
 //   wire_bench MODEL SIZE_MM DPI SCALE REAL STOPS
 //
 // paints MODEL at SCALE wall seconds a cell second, then the first REAL dots of it in real time, then measures STOPS.
@@ -31,6 +32,7 @@
 namespace {
 
 using namespace hilbrush;
+using test::painted_in_process;
 using test::WiredWorld;
 using Wall = std::chrono::steady_clock;
 
@@ -151,6 +153,93 @@ void compare_films(const std::string& model, double size_mm, const std::vector<E
               away.size(), quantile(away, .5), quantile(away, .99), quantile(away, 1), missed);
 }
 
+/// The same device, told nothing ahead.
+template <std::size_t N>
+class ToldInTime final : public AxisGroup<N> {
+ public:
+  using Positions = typename AxisGroup<N>::Positions;
+  explicit ToldInTime(AxisGroup<N>& axes) : axes_(axes) {}
+  void connect() override { axes_.connect(); }
+  void enable() override { axes_.enable(); }
+  void home() override { axes_.home(); }
+  void disable() noexcept override { axes_.disable(); }
+  void clear_fault() override { axes_.clear_fault(); }
+  void move_to(const Positions& target, double settle_s) override { axes_.move_to(target, settle_s); }
+  typename AxisGroup<N>::Status status() override { return axes_.status(); }
+  double expected_arrival_s() override { return axes_.expected_arrival_s(); }
+  void stop() noexcept override { axes_.stop(); }
+
+ private:
+  AxisGroup<N>& axes_;
+};
+class LaserToldInTime final : public Laser {
+ public:
+  explicit LaserToldInTime(Laser& laser) : laser_(laser) {}
+  void connect() override { laser_.connect(); }
+  Limits limits() override { return laser_.limits(); }
+  void enable() override { laser_.enable(); }
+  void disable() noexcept override { laser_.disable(); }
+  void fire(double power_w, double pulse_s) override { laser_.fire(power_w, pulse_s); }
+  bool off() noexcept override { return laser_.off(); }
+  Status status() override { return laser_.status(); }
+  void clear_fault() override { laser_.clear_fault(); }
+
+ private:
+  Laser& laser_;
+};
+
+/// The table moves for every dot, each with another power; a chain of way-points of the arm before every tenth.
+ExposureProgram restless_job(const CellDescription& cell, std::size_t count) {
+  ExposureProgram program = test::small_job(cell, count, 1, count);
+  program.vias.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    Exposure& exposure = program.exposures[i];
+    exposure.joints[kTilt] = .01 * static_cast<double>(i % 3);
+    exposure.joints[kRotation] = .02 * static_cast<double>(i % 5);
+    exposure.power_w *= i % 2 == 0 ? 1.f : .5f;
+    if (i % 10 != 9) continue;
+    Joints via = program.exposures[i - 1].joints;
+    for (int step = 1; step <= 6; ++step) {
+      via[kJ3] += .003;
+      program.vias.push_back({static_cast<std::uint32_t>(i), via});
+    }
+  }
+  return program;
+}
+
+double seconds_a_dot(WiredWorld& world, const ExposureProgram& program, const Cell& cell) {
+  ExecutionControl control;
+  world.recover(control, 20);
+  Journal journal = Journal::in_memory(program.exposures.size());
+  const ExecutionResult result = execute(program, {}, cell, world.description, journal, control);
+  if (result.outcome != ExecutionOutcome::kFinished) std::printf("  stopped: %s\n", result.reason.c_str());
+  return result.elapsed_s / static_cast<double>(std::max<std::size_t>(journal.done_count(), 1));
+}
+
+void measure_ahead() {
+  constexpr std::size_t kDots = 100;
+  constexpr int kRounds = 3;
+  using Table = WireOptions::Table;
+  for (const auto& [name, table] : {std::pair{"oriental-az", Table::kOrientalAz}, std::pair{"cia402", Table::kCia402},
+                                    std::pair{"leadshine-pr", Table::kLeadshinePr}}) {
+    WireOptions options = WiredWorld::quick(1, .01);
+    options.table = table;
+    WiredWorld world(options);
+    const ExposureProgram program = restless_job(world.description, kDots);
+    const Cell cell = world.cell();
+    ToldInTime<4> robot(cell.robot);
+    ToldInTime<2> slow_table(cell.table);
+    LaserToldInTime laser(cell.laser);
+    std::vector<double> ahead, in_time;
+    for (int round = 0; round < kRounds; ++round) {
+      in_time.push_back(seconds_a_dot(world, program, {robot, slow_table, laser, cell.clock}));
+      ahead.push_back(seconds_a_dot(world, program, cell));
+    }
+    std::printf("%s, %zu dots, %d rounds: %.3f ms a dot told in time, %.3f ms told ahead\n", name, kDots, kRounds,
+                quantile(in_time, .5) * 1e3, quantile(ahead, .5) * 1e3);
+  }
+}
+
 /// In real time: long pulses, each stopped at a random moment.
 void measure_stops(int stops) {
   WiredWorld world(WiredWorld::quick(1, .01));
@@ -191,6 +280,10 @@ void measure_stops(int stops) {
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  if (argc == 2 && std::string(argv[1]) == "ahead") {
+    measure_ahead();
+    return 0;
+  }
   const bool has_model = argc > 6;
   const double time_scale = has_model ? std::atof(argv[4]) : .05;
   const std::size_t real_dots = has_model ? static_cast<std::size_t>(std::atoi(argv[5])) : 60;

@@ -49,6 +49,8 @@ class CampaignWorld {
   virtual std::uint64_t faults_begun() = 0;
   /// Calls `stop` once, so many cell seconds from now, from wherever time passes.
   virtual void stop_later(double after_s, std::function<void()> stop) = 0;
+  /// Whatever stop_later() was told has been called, or never will be.
+  virtual void forget_stop() = 0;
   /// How long a case may take, in cell seconds: twelve dots take two; faults and patience the rest.
   virtual double patience_s() const = 0;
   /// Where the robot itself loses the queued end of a pulse (an alarm; a refusal or a lost connection between on and
@@ -76,6 +78,7 @@ class VirtualWorld final : public CampaignWorld {
       stop();
     };
   }
+  void forget_stop() override { cell_.clock.on_time = {}; }
   double patience_s() const override { return 300; }
   /// Here asking for a status waits for a device that is late, unlike in real drivers: two patiences of the link.
   double lost_end_s() const override { return .25; }
@@ -88,9 +91,6 @@ class WorldOnWires final : public CampaignWorld {
  public:
   static constexpr double kTimeScale = .05;
   WorldOnWires() : world_(WiredWorld::quick(kTimeScale)) {}
-  ~WorldOnWires() override {
-    if (stopper_.joinable()) stopper_.join();
-  }
   Cell cell() override { return world_.cell(); }
   std::vector<Emission> emissions() override { return world_.emissions(); }
   void add(const WireFault& fault) override { world_.wire().add_fault(fault); }
@@ -105,6 +105,9 @@ class WorldOnWires final : public CampaignWorld {
       std::this_thread::sleep_for(std::chrono::duration<double>(after_s * kTimeScale));
       stop();
     });
+  }
+  void forget_stop() override {
+    if (stopper_.joinable()) stopper_.join();
   }
   double patience_s() const override { return 60 / kTimeScale; }
   /// Wall time, as the cell's clock counts it.
@@ -131,6 +134,9 @@ class Case {
         program_(test::small_job(description, kDots, 1 + number % 50, 4)),
         world_(world),
         journal_(Journal::in_memory(kDots)) {}
+  ~Case() { world_.forget_stop(); }
+  Case(const Case&) = delete;
+  Case& operator=(const Case&) = delete;
   void run(Tally& tally);
 
  private:

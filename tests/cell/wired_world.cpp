@@ -5,6 +5,7 @@
 #include <random>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "config/cell_file.h"
 #include "config/json_reader.h"
@@ -73,6 +74,11 @@ void WiredWorld::recover(ExecutionControl& control, int attempts) {
 std::vector<Emission> WiredWorld::emissions() const {
   const std::lock_guard lock(mutex_);
   return emissions_;
+}
+
+std::vector<Emission> WiredWorld::take_emissions() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(emissions_, {});
 }
 
 std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description) {

@@ -31,6 +31,8 @@ class WiredWorld {
   Cell cell() { return devices_->cell(); }
   WireCell& wire() { return wire_; }
   std::vector<Emission> emissions() const;
+  /// Those since the last call; they are forgotten.
+  std::vector<Emission> take_emissions();
   const std::filesystem::path& cell_file() const { return cell_file_; }
   const testing_support::TemporaryFolder& folder() const { return folder_; }
 

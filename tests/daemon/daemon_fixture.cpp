@@ -84,8 +84,10 @@ LineClient::LineClient(const fs::path& socket) : fd_(::socket(AF_UNIX, SOCK_STRE
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, socket.c_str(), sizeof address.sun_path - 1);
-  if (::connect(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
-    throw std::runtime_error("no daemon answers on " + socket.string() + ": " + std::strerror(errno));
+  if (::connect(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) return;
+  const int error = errno;
+  ::close(fd_);
+  throw std::runtime_error("no daemon answers on " + socket.string() + ": " + std::strerror(error));
 }
 
 std::unique_ptr<LineClient> LineClient::over_tcp(const std::string& address) {

@@ -1,23 +1,16 @@
 #include <gtest/gtest.h>
-#include <malloc.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <random>
-#include <set>
 
 #include "planner/program_file.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/sim_devices.h"
+#include "tests/daemon/soak_support.h"
 
 /// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients
 /// that come, talk nonsense and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N so many seconds.
@@ -28,80 +21,6 @@ namespace fs = std::filesystem;
 using test::DaemonWorld;
 using test::Json;
 using test::LineClient;
-using Steady = std::chrono::steady_clock;
-
-std::size_t descriptors() {
-  return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator{}));
-}
-
-double resident_mb() {
-  ::malloc_trim(0);
-  std::ifstream in("/proc/self/statm");
-  double size = 0, resident = 0;
-  in >> size >> resident;
-  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
-
-/// Clients that mean no good: half messages, nonsense, watchers that never read, connections dropped at any time.
-class Crowd {
- public:
-  Crowd(DaemonWorld& world, unsigned seed) : world_(world), random_(seed), thread_([this] { run(); }) {}
-  ~Crowd() { end(); }
-  void end() {
-    is_ending_ = true;
-    if (thread_.joinable()) thread_.join();
-  }
-  std::size_t visits() const { return visits_; }
-
- private:
-  void run() {
-    while (!is_ending_) {
-      try {
-        visit();
-      } catch (const std::exception&) {  // thrown out, or nobody answered: both may be
-      }
-      ++visits_;
-    }
-  }
-  void visit() {
-    LineClient client(world_.options.socket);
-    switch (random_() % 6) {
-      case 0:
-        client.send_bytes("{\"jsonrpc\":\"2.0\",\"id\":1,\"meth");
-        break;
-      case 1: {
-        std::string noise(random_() % 5000, ' ');
-        for (char& c : noise) c = static_cast<char>(random_());
-        client.send_bytes(noise + "\n");
-        break;
-      }
-      case 2:
-        client.call("job.watch", {{"id", std::to_string(1 + random_() % 50)}});
-        std::this_thread::sleep_for(std::chrono::milliseconds(random_() % 50));
-        break;
-      case 3:
-        for (int i = 0; i < 50; ++i)
-          client.send_without_waiting("{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"rpc.discover\"}\n");
-        break;
-      case 4:
-        client.call("job.list", {{"limit", 20}});
-        client.call("cell.status");
-        client.call("job.start", {{"id", "1"}, {"part_in_place", true}});
-        break;
-      default:
-        client.call("system.info");
-        client.end_sending();
-        while (client.read_line()) {
-        }
-    }
-  }
-
-  DaemonWorld& world_;
-  std::mt19937 random_;
-  std::atomic<bool> is_ending_{false};
-  std::atomic<std::size_t> visits_{0};
-  std::thread thread_;
-};
 
 class Soak {
  public:
@@ -225,45 +144,13 @@ class Soak {
 };
 
 TEST(SoakTest, JobsFaultsAndClientsLeaveNoTraceInMemoryOrDescriptorsAndCountsAreTrue) {
-  const char* given_s = std::getenv("HILBRUSH_SOAK_S");
-  const int by_default_s = std::getenv("HILBRUSH_LONG") != nullptr ? 3600 : 12;
-  const auto length = std::chrono::seconds(given_s != nullptr ? std::atoi(given_s) : by_default_s);
   const unsigned seed = 31;
   SCOPED_TRACE(seed);
   Soak soak(seed);
-  const auto begin = Steady::now();
-  const auto run_until = [&](Steady::time_point end, unsigned crowd_seed) {
-    Crowd a(soak.world(), crowd_seed), b(soak.world(), crowd_seed + 1);
-    while (Steady::now() < end && !::testing::Test::HasFailure()) soak.paint_one_job();
-    a.end();
-    b.end();
-    return a.visits() + b.visits();
-  };
-  std::size_t visits = run_until(begin + length / 4, 100);
-  // Gone clients are noticed when the daemon next looks.
-  const auto settle = [&] {
-    LineClient client(soak.world().options.socket);
-    for (int i = 0; i < 500; ++i) {
-      if (client.result("system.info").at("system").at("clients") == 1) break;
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    EXPECT_EQ(client.result("system.info").at("system").at("clients"), 1);
-  };
-  settle();
-  const auto fds = descriptors();
-  const double mb = resident_mb();
-  const auto jobs = soak.jobs;
-  visits += run_until(begin + length, 200);
-  settle();
-  const auto fds_after = descriptors();
-  const double mb_after = resident_mb();
+  const test::SoakTrace trace = test::soak(soak.world(), test::soak_length(12), [&] { soak.paint_one_job(); });
   std::cout << soak.jobs << " jobs, " << soak.disturbances << " disturbances, " << soak.doubts << " dots in doubt, "
-            << visits << " visits; resident " << mb << " -> " << mb_after << " MB over " << soak.jobs - jobs
-            << " jobs, descriptors " << fds << " -> " << fds_after << "\n";
-  EXPECT_LE(fds_after, fds + 2);
-  // A thousand jobs of history are kept in memory, some kilobytes each.
-  EXPECT_LE(mb_after, mb + 12);
-  EXPECT_GT(soak.jobs, jobs) << "nothing was painted in the time that was looked at";
+            << trace << "\n";
+  test::expect_no_trace(trace);
 }
 
 }  // namespace

@@ -1,5 +1,10 @@
+#include <fcntl.h>
+#include <sys/select.h>
+#include <unistd.h>
+
 #include "config/register_map_file.h"
 #include "drivers/mapped_drive.h"
+#include "tests/drivers/modbus_peer.h"
 #include "tests/drivers/wired_cell.h"
 
 /// Positioning axes over Modbus TCP, each with its maker's table of registers, against the simulated ones.
@@ -137,6 +142,29 @@ TEST_P(WiredAxes, ALostConnectionIsAFaultThatCanBeCleared) {
   table->enable();
   table->home();
   move({.1, .3});
+}
+
+/// More clients than select() can count must not end the daemon when the table is connected anew.
+TEST(ModbusBusTest, TooManyDescriptorsAreASentence) {
+  ModbusPeer peer([](ModbusPeer::Registers&) {});
+  ModbusEndpoint endpoint;
+  endpoint.host = "127.0.0.1";
+  endpoint.tcp_port = peer.port();
+  ModbusBus bus(endpoint);
+  std::vector<int> open;
+  do open.push_back(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  while (open.back() >= 0 && open.back() < FD_SETSIZE);
+  std::string sentence;
+  try {
+    bus.connect();
+  } catch (const LinkError& error) {
+    sentence = error.what();
+  }
+  for (const int descriptor : open)
+    if (descriptor >= 0) ::close(descriptor);
+  EXPECT_NE(sentence.find("too many files and clients"), std::string::npos) << sentence;
+  bus.connect();
+  EXPECT_TRUE(bus.is_open());
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -1,0 +1,137 @@
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <random>
+#include <set>
+
+#include "planner/program_file.h"
+#include "tests/cell/fault_plan.h"
+#include "tests/cell/wired_world.h"
+#include "tests/cell/witness.h"
+#include "tests/daemon/soak_support.h"
+
+/// The daemon with its real drivers on wires, for long: jobs, faults of every kind, connections that are lost and made
+/// again, stops, the daemon's own restarts, clients that mean no good. HILBRUSH_LONG=1 makes it an hour,
+/// HILBRUSH_SOAK_S=N so many seconds.
+namespace hilbrush {
+namespace {
+
+using test::DaemonWorld;
+using test::Json;
+using test::LineClient;
+using test::WiredWorld;
+
+constexpr double kTimeScale = .05;
+
+class WireSoak {
+ public:
+  explicit WireSoak(unsigned seed) : random_(seed) {
+    daemons_.options.cell = wires_.cell_file().string();
+    daemons_.options.time_scale.reset();  // the cell file's
+    models_ = {daemons_.model("cup.wrl", 80), daemons_.model("bowl.wrl", 160)};
+    daemons_.begin();
+  }
+
+  void paint_one_job() {
+    constexpr unsigned kRestartEvery = 20;
+    if (random_() % kRestartEvery == 0) restart();
+    LineClient client(daemons_.options.socket);
+    const std::string id = daemons_.submit(client, models_[random_() % models_.size()], "ready");
+    wires_.take_emissions();
+    set_going(client, id);
+    for (;;) {
+      const std::string now = state(client, id);
+      if (now == "done") break;
+      if (now == "failed") throw std::runtime_error(client.result("job.get", {{"id", id}}).dump());
+      if (now == "paused") set_going(client, id);
+      if (random_() % 60 == 0) disturb(client, id);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    check(client.result("job.get", {{"id", id}}).at("job"), id);
+  }
+
+  DaemonWorld& world() { return daemons_; }
+  std::size_t disturbances = 0, lost_connections = 0, restarts = 0, dots = 0, doubts = 0;
+
+ private:
+  std::string state(LineClient& client, const std::string& id) {
+    return client.result("job.get", {{"id", id}}).at("job").at("state").get<std::string>();
+  }
+
+  void restart() {
+    daemons_.end();
+    daemons_.begin();
+    ++restarts;
+  }
+
+  /// Armed and painting, from whatever state the cell is in; what went wrong has been mended.
+  void set_going(LineClient& client, const std::string& id) {
+    wires_.wire().clear_faults();
+    for (int attempt = 0; attempt < 400; ++attempt) {
+      const auto cell = client.result("cell.status").at("cell").at("state").get<std::string>();
+      if (cell == "stopped") client.call("cell.clear");
+      if (cell == "idle") client.call("cell.arm");
+      const auto job = state(client, id);
+      if (job != "ready" && job != "paused") return;
+      client.call(job == "ready" ? "job.start" : "job.resume", {{"id", id}, {"part_in_place", true}});
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    throw std::runtime_error("job " + id + " can't be got going: " + client.call("cell.status").dump());
+  }
+
+  void disturb(LineClient& client, const std::string& id) {
+    ++disturbances;
+    if (random_() % 8 == 0) {
+      client.result("cell.stop");
+      return;
+    }
+    if (random_() % 8 == 0) {
+      client.call("job.pause", {{"id", id}});
+      return;
+    }
+    WireFault fault = test::random_fault(random_, 1);
+    if (random_() % 3 == 0) fault.kind = WireFaultKind::kDroppedConnection;
+    if (fault.kind == WireFaultKind::kDroppedConnection) ++lost_connections;
+    fault.trigger = {};
+    fault.trigger.at_s = wires_.wire().now_s() + static_cast<double>(random_() % 100) * 1e-3;
+    wires_.wire().add_fault(fault);
+  }
+
+  /// The witness against the counts.
+  void check(const Json& job, const std::string& id) {
+    const ExposureProgram program = read_program(daemons_.job_folder(id) / "program.ply");
+    // A lost end of a pulse lasts until it is seen; an axis that drifts a little is still in position.
+    const test::WitnessOptions options{.joint_tolerance = 1e-3, .overrun_s = .3 / kTimeScale};
+    const auto testimony = test::hear_witness(program, wires_.take_emissions(), options);
+    EXPECT_EQ(testimony.in_motion, 0u);
+    EXPECT_EQ(testimony.strays, 0u);
+    EXPECT_EQ(testimony.too_long, 0u) << testimony.longest_overrun_s;
+    const auto in_doubt = job.at("in_doubt").get<std::set<std::size_t>>();
+    EXPECT_EQ(job.at("dots").at("exposed").get<std::size_t>() + in_doubt.size(), program.exposures.size());
+    for (std::size_t i = 0; i < program.exposures.size(); ++i) {
+      ASSERT_LE(testimony.light[i], 1) << "dot " << i << " of job " << id;
+      ASSERT_TRUE(testimony.is_whole[i] || in_doubt.contains(i)) << "dot " << i << " of job " << id;
+    }
+    dots += program.exposures.size();
+    doubts += in_doubt.size();
+  }
+
+  std::mt19937 random_;
+  WiredWorld wires_{WiredWorld::quick(kTimeScale), WiredWorld::Drivers::kNone};
+  DaemonWorld daemons_;
+  std::vector<std::filesystem::path> models_;
+};
+
+TEST(WireSoakTest, FaultsReconnectionsAndClientsLeaveNoTraceAndCountsAreTrue) {
+  const unsigned seed = 77;
+  SCOPED_TRACE(seed);
+  WireSoak soak(seed);
+  const test::SoakTrace trace = test::soak(soak.world(), test::soak_length(12), [&] { soak.paint_one_job(); });
+  std::cout << trace.jobs << " jobs, " << soak.dots << " dots, " << soak.doubts << " in doubt, " << soak.disturbances
+            << " disturbances, " << soak.lost_connections << " lost connections, " << soak.restarts << " restarts, "
+            << trace << "\n";
+  test::expect_no_trace(trace);
+}
+
+}  // namespace
+}  // namespace hilbrush
