@@ -48,6 +48,17 @@ void read_arm(JsonObject& json, CellDescription::Arm& arm) {
   arm.quill_radius_m = json.quantity("quill_radius_mm", {0, 500});
 }
 
+/// Unless the file says how high it is, the column ends where the upper arm begins.
+void read_column(JsonObject& json, CellDescription::Arm& arm) {
+  if (!json.has("column_radius_mm")) {
+    if (json.has("column_height_mm")) json.refuse("column_height_mm", "has no column_radius_mm beside it");
+    return;
+  }
+  arm.column.radius_m = json.quantity("column_radius_mm", {0, 2000});
+  arm.column.height_m = json.has("column_height_mm") ? json.quantity("column_height_mm", {0, 5000})
+                                                     : std::max(0., arm.upper_link.height_m - arm.upper_link.radius_m);
+}
+
 /// The links run above all that the lens can reach, unless the file says where, and the quill ends in the forearm.
 void read_links(JsonObject& json, const AxisDescription& j3, const CellDescription::Lens& lens,
                 CellDescription::Arm& arm) {
@@ -160,6 +171,7 @@ CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOp
   json.object("arm", [&](JsonObject& arm) {
     read_arm(arm, cell.arm);
     read_links(arm, cell.axes[kJ3], cell.lens, cell.arm);
+    read_column(arm, cell.arm);
   });
   json.object("table", [&](JsonObject& table) { read_table(table, cell.table); });
   json.object("fixture", [&](JsonObject& fixture) { read_fixture(fixture, cell.fixture); });
@@ -240,6 +252,8 @@ std::vector<std::string> cell_warnings(const CellDescription& cell) {
       cell.arm.upper_arm_m + cell.arm.forearm_m + cell.arm.flange_to_focus_m * std::cos(cell.arm.beam_depression);
   if (cell.table.tilt_axis_W.head<2>().norm() > reach)
     warn("$.table.tilt_axis_mm", "farther from J1 than the arm reaches");
+  if (cell.arm.column.radius_m + cell.table.plate_radius_m > cell.table.tilt_axis_W.head<2>().norm())
+    warn("$.arm.column_radius_mm", "the table's plate would stand in the robot's column");
   return warnings;
 }
 

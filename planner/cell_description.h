@@ -63,6 +63,11 @@ struct CellDescription {
       double height_m = 0;  ///< of that line, in W
       double radius_m = 0;  ///< 0: no link
     } upper_link, fore_link;
+    /// What J1 stands on: an upright cylinder around its axis, from z = 0 in W.
+    struct Column {
+      double height_m = 0;
+      double radius_m = 0;  ///< 0: no column
+    } column;
   } arm;
   struct Lens {  ///< a cylinder around the beam, behind the focus
     double radius_m = 0, near_m = 0, far_m = 0;

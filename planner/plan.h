@@ -25,7 +25,7 @@ enum class SkipReason : std::uint8_t {
   kLensObject,  ///< the lens body or quill would touch the object
   kLensTable,   ///< ... or the table plate, post
   kEnergy,      ///< the laser cannot deliver the dot's energy
-  kArm,         ///< a link of the arm would touch the object, the table or the lens
+  kArm,         ///< a link of the arm or the robot's column would touch the object, the table or the tool
   kNoWay        ///< there are poses, but no clear way to one
 };
 inline constexpr int kSkipReasonCount = 8;

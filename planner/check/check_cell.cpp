@@ -253,6 +253,35 @@ std::string CheckCell::link_fault(const CellDescription::Arm::Link& link, double
   return {};
 }
 
+/// The column against the table's side as any other body; points along the axes of lens, quill and forearm against it.
+std::string CheckCell::column_fault(const Eigen::Isometry3d& X_WF, const Eigen::Isometry3d& X_W_fore,
+                                    const Eigen::Isometry3d& X_OW) const {
+  const auto& column = cell_.arm.column;
+  if (column.radius_m <= 0) return {};
+  const Eigen::Vector3d object_W = X_OW.inverse().translation();
+  if (object_W.head<2>().norm() < reach_m_ + column.radius_m) {
+    const Cylinder body{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), column.height_m, column.radius_m};
+    if (std::string fault = body_fault(body, "the robot's column", X_OW); !fault.empty()) return fault;
+  }
+  const auto is_near = [&](const Eigen::Vector3d& p_W, double radius_m) {
+    const double beside_m = std::max(0., p_W.head<2>().norm() - column.radius_m);
+    const double above_m = std::max(0., std::max(p_W.z() - column.height_m, -p_W.z()));
+    return std::hypot(beside_m, above_m) < radius_m;
+  };
+  const auto touches = [&](const Cylinder& body, const Eigen::Isometry3d& X_WB) {
+    constexpr int kPoints = 24;
+    for (int i = 0; i <= kPoints; ++i)
+      if (is_near(X_WB * (body.from_F + (body.length_m * i / kPoints) * body.axis_F), body.radius_m)) return true;
+    return false;
+  };
+  if (touches(lens_, X_WF)) return "the lens body touches the robot's column";
+  if (touches(quill_, X_WF)) return "the quill touches the robot's column";
+  const Cylinder fore{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), cell_.arm.forearm_m,
+                      cell_.arm.fore_link.radius_m};
+  if (fore.radius_m > 0 && touches(fore, X_W_fore)) return "the forearm touches the robot's column";
+  return {};
+}
+
 std::string CheckCell::body_fault(const Joints& joints) const {
   using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
   const Eigen::Isometry3d X_WF_now = X_WF(joints), X_OW = X_WO(joints).inverse();
@@ -265,7 +294,8 @@ std::string CheckCell::body_fault(const Joints& joints) const {
                                  Translation3d(0, 0, arm.fore_link.height_m);
   std::string fault = link_fault(arm.fore_link, arm.forearm_m, "the forearm", fore, X_WF_now, X_OW);
   if (!fault.empty()) return fault;
-  return link_fault(arm.upper_link, arm.upper_arm_m, "the upper arm", upper, X_WF_now, X_OW);
+  fault = link_fault(arm.upper_link, arm.upper_arm_m, "the upper arm", upper, X_WF_now, X_OW);
+  return fault.empty() ? column_fault(X_WF_now, fore, X_OW) : fault;
 }
 
 double CheckCell::travel_m(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const {

@@ -30,7 +30,7 @@ class CheckCell {
   std::string beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const;
   /// What lens body or quill run into; empty if nothing.
   std::string body_fault(const Eigen::Isometry3d& X_OF) const;
-  /// ... or upper arm or forearm.
+  /// ... or upper arm, forearm or the robot's column.
   std::string body_fault(const Joints& joints) const;
   /// How far the ends of the lens travel in O between two poses.
   double travel_m(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;
@@ -49,6 +49,8 @@ class CheckCell {
   std::string link_fault(const CellDescription::Arm::Link& link, double length_m, const char* name,
                          const Eigen::Isometry3d& X_WB, const Eigen::Isometry3d& X_WF,
                          const Eigen::Isometry3d& X_OW) const;
+  std::string column_fault(const Eigen::Isometry3d& X_WF, const Eigen::Isometry3d& X_W_fore,
+                           const Eigen::Isometry3d& X_OW) const;
   bool touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const;
   bool touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OB) const;
   bool is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O, const std::array<Eigen::Vector3d, 16>& along_O,

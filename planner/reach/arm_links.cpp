@@ -31,6 +31,12 @@ double segment_distance_m(const Capsule& a, const Capsule& b) {
   return (r + s * d1 - t * d2).norm();
 }
 
+Eigen::Vector3d flange_W(const CellDescription::Arm& arm, const Joints& joints) {
+  const double forearm_angle = joints[kJ1] + joints[kJ2];
+  return {arm.upper_arm_m * std::cos(joints[kJ1]) + arm.forearm_m * std::cos(forearm_angle),
+          arm.upper_arm_m * std::sin(joints[kJ1]) + arm.forearm_m * std::sin(forearm_angle), joints[kJ3]};
+}
+
 }  // namespace
 
 std::array<Capsule, 2> arm_links_W(const CellDescription::Arm& arm, const Joints& joints) {
@@ -46,16 +52,29 @@ std::array<Capsule, 2> arm_links_W(const CellDescription::Arm& arm, const Joints
 
 Capsule lens_capsule_W(const CellDescription& cell, const Joints& joints) {
   const auto& arm = cell.arm;
-  const double forearm_angle = joints[kJ1] + joints[kJ2], yaw = forearm_angle + joints[kJ4];
+  const double yaw = joints[kJ1] + joints[kJ2] + joints[kJ4];
   const double ce = std::cos(arm.beam_depression), se = std::sin(arm.beam_depression);
-  const Eigen::Vector3d flange_W(arm.upper_arm_m * std::cos(joints[kJ1]) + arm.forearm_m * std::cos(forearm_angle),
-                                 arm.upper_arm_m * std::sin(joints[kJ1]) + arm.forearm_m * std::sin(forearm_angle),
-                                 joints[kJ3]);
+  const Eigen::Vector3d flange = flange_W(arm, joints);
   const Eigen::Vector3d beam_W(ce * std::cos(yaw), ce * std::sin(yaw), -se);
   const auto behind_focus = [&](double length_m) -> Eigen::Vector3d {
-    return flange_W + (arm.flange_to_focus_m - length_m) * beam_W;
+    return flange + (arm.flange_to_focus_m - length_m) * beam_W;
   };
   return {behind_focus(cell.lens.near_m), behind_focus(cell.lens.far_m), cell.lens.radius_m};
+}
+
+Capsule quill_capsule_W(const CellDescription::Arm& arm, const Joints& joints) {
+  const Eigen::Vector3d flange = flange_W(arm, joints);
+  return {flange, flange + Eigen::Vector3d(0, 0, arm.quill_length_m), arm.quill_radius_m};
+}
+
+Capsule column_capsule_W(const CellDescription::Arm& arm) {
+  return {{0, 0, 0}, {0, 0, arm.column.height_m}, arm.column.radius_m};
+}
+
+double column_gap_m(const CellDescription::Arm& arm, const Capsule& body) {
+  // What lies above the top keeps at least that height from it, whatever the capsule's rounded end bulges there.
+  const double above_m = std::min(body.from.z(), body.to.z()) - body.radius_m - arm.column.height_m;
+  return std::max(above_m, capsule_gap_m(column_capsule_W(arm), body));
 }
 
 double capsule_gap_m(const Capsule& a, const Capsule& b) {

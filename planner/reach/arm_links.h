@@ -5,8 +5,8 @@
 #include "planner/cell_description.h"
 #include "planner/kinematics.h"
 
-/// Where the arm's two links are: capsules at fixed heights, over which J1 and J2 turn and through which the quill
-/// slides.
+/// Where the arm is: two links, capsules at fixed heights, over which J1 and J2 turn and through which the quill
+/// slides; lens and quill; and the column that all of it stands on.
 namespace hilbrush {
 
 struct Capsule {
@@ -26,6 +26,15 @@ std::array<Capsule, 2> arm_links_W(const CellDescription::Arm& arm, const Joints
 
 /// The lens, in W: the capsule that holds its cylinder.
 Capsule lens_capsule_W(const CellDescription& cell, const Joints& joints);
+
+/// The quill, in W: the capsule that holds its cylinder.
+Capsule quill_capsule_W(const CellDescription::Arm& arm, const Joints& joints);
+
+/// The robot's column, in W: the capsule that holds its cylinder.
+Capsule column_capsule_W(const CellDescription::Arm& arm);
+
+/// Between the column, which has a flat top, and a capsule beside or above it: a lower bound, exact beside it.
+double column_gap_m(const CellDescription::Arm& arm, const Capsule& body);
 
 /// Between the surfaces; negative if they overlap.
 double capsule_gap_m(const Capsule& a, const Capsule& b);

@@ -52,10 +52,24 @@ bool links_come_near_lens(const CellDescription& cell, double slack_m) {
   return is_near(arm.upper_link) || is_near(arm.fore_link);
 }
 
+/// Whether what turns around the tilt axis comes near the column.
+bool column_comes_near(const CellDescription& cell, double radius_around_tilt_m, double slack_m) {
+  const double column_m = cell.arm.column.radius_m;
+  return column_m > 0 && std::abs(cell.table.tilt_axis_W.x()) < radius_around_tilt_m + column_m + slack_m;
+}
+
+double tool_radius_m(const CellDescription& cell) {
+  const auto& arm = cell.arm;
+  const double along_beam_m =
+      std::max(std::abs(cell.lens.far_m - arm.flange_to_focus_m), std::abs(arm.flange_to_focus_m - cell.lens.near_m));
+  return std::max({along_beam_m + cell.lens.radius_m, arm.quill_radius_m, arm.fore_link.radius_m});
+}
+
 /// Beyond the largest body that is looked up.
-double field_range_m(const CellDescription& cell, bool has_links) {
+double field_range_m(const CellDescription& cell, bool has_links, bool has_column) {
   double radius = std::max(cell.lens.radius_m, cell.arm.quill_radius_m);
   if (has_links) radius = std::max({radius, cell.arm.upper_link.radius_m, cell.arm.fore_link.radius_m});
+  if (has_column) radius = std::max(radius, cell.arm.column.radius_m);
   return 1.1 * radius + Clearance::kSlackMaxM;
 }
 
@@ -67,8 +81,10 @@ Clearance::Clearance(const TexturedMesh& mesh, const CellDescription& cell)
       radius_around_rotation_m_(radius_around(mesh, cell, 0, false)),
       links_may_touch_(links_come_near(cell, radius_around_tilt_m_, kSlackMaxM)),
       links_may_touch_lens_(links_come_near_lens(cell, kSlackMaxM)),
+      column_may_touch_(column_comes_near(cell, radius_around_tilt_m_, kSlackMaxM)),
+      tool_radius_m_(tool_radius_m(cell)),
       rays_(mesh),
-      distance_(mesh, field_range_m(cell, links_may_touch_)) {}
+      distance_(mesh, field_range_m(cell, links_may_touch_, column_may_touch_)) {}
 
 Shortfall Clearance::Slack::shortfall(Obstruction by_object, Obstruction by_table) const {
   if (least_m() >= kMarginM) return {};
@@ -194,12 +210,38 @@ Clearance::Slack Clearance::links_slack(const TablePose& table, const Joints& jo
   Slack slack;
   if (!links_may_touch_) return slack;
   for (const Capsule& link_W : arm_links_W(cell_.arm, joints)) {
-    if (link_W.radius_m <= 0) continue;
-    const Capsule link = link_W.in_O(table);
-    const double length_m = (link.to - link.from).norm();
-    lessen(cover(link.from, (link.to - link.from) / length_m, length_m, link.radius_m, .3 * link.radius_m), slack);
+    if (link_W.radius_m > 0) lessen(link_W.in_O(table), slack);
   }
   return slack;
+}
+
+Clearance::Slack Clearance::column_slack(const TablePose& table) const {
+  Slack slack;
+  if (column_may_touch_) lessen(column_capsule_W(cell_.arm).in_O(table), slack);
+  return slack;
+}
+
+void Clearance::lessen(const Capsule& capsule_O, Slack& slack) const {
+  const double length_m = std::max((capsule_O.to - capsule_O.from).norm(), 1e-6);
+  lessen(cover(capsule_O.from, (capsule_O.to - capsule_O.from) / length_m, length_m, capsule_O.radius_m,
+               .3 * capsule_O.radius_m),
+         slack);
+}
+
+/// Lens, quill and forearm against the column; the upper arm stands on it.
+double Clearance::column_tool_gap_m(const Joints& joints) const {
+  const auto& arm = cell_.arm;
+  if (arm.column.radius_m <= 0) return kSlackMaxM;
+  const double cos_elbow = std::cos(joints[kJ2]), l1 = arm.upper_arm_m, l2 = arm.forearm_m;
+  // The forearm's nearest point to J1's axis is where it passes it, or one of its ends.
+  const bool passes = -l1 * cos_elbow > 0 && -l1 * cos_elbow < l2;
+  const double nearest_m = passes ? l1 * std::sqrt(1 - cos_elbow * cos_elbow)
+                                  : std::min(l1, std::sqrt(l1 * l1 + l2 * l2 + 2 * l1 * l2 * cos_elbow));
+  if (nearest_m - tool_radius_m_ - arm.column.radius_m >= kSlackMaxM) return kSlackMaxM;
+  double gap_m = std::min(
+      {kSlackMaxM, column_gap_m(arm, lens_capsule_W(cell_, joints)), column_gap_m(arm, quill_capsule_W(arm, joints))});
+  if (arm.fore_link.radius_m > 0) gap_m = std::min(gap_m, column_gap_m(arm, arm_links_W(arm, joints)[1]));
+  return gap_m;
 }
 
 double Clearance::link_lens_gap_m(const Joints& joints) const {
@@ -221,7 +263,7 @@ Obstruction Clearance::quill_obstruction(const ToolPose& tool) const {
 }
 
 Obstruction Clearance::links_obstruction(const TablePose& table, const Joints& joints) const {
-  return links_may_touch_ || links_may_touch_lens_ ? links_shortfall(table, joints).what : Obstruction::kNone;
+  return arm_may_touch() ? links_shortfall(table, joints).what : Obstruction::kNone;
 }
 
 Obstruction Clearance::body_obstruction(const ToolPose& tool) const {
@@ -238,10 +280,12 @@ Shortfall Clearance::quill_shortfall(const ToolPose& tool) const {
 }
 
 Shortfall Clearance::links_shortfall(const TablePose& table, const Joints& joints) const {
-  const Shortfall outer = links_slack(table, joints).shortfall(Obstruction::kLinkObject, Obstruction::kLinkTable);
-  const double gap_m = link_lens_gap_m(joints);
-  if (kMarginM - gap_m > outer.amount_m) return {Obstruction::kLinkLens, kMarginM - gap_m};
-  return outer;
+  Shortfall worst = links_slack(table, joints).shortfall(Obstruction::kLinkObject, Obstruction::kLinkTable);
+  for (const Shortfall& other : {Shortfall{Obstruction::kLinkLens, kMarginM - link_lens_gap_m(joints)},
+                                 column_slack(table).shortfall(Obstruction::kColumnObject, Obstruction::kColumnTable),
+                                 Shortfall{Obstruction::kColumnTool, kMarginM - column_tool_gap_m(joints)}})
+    if (other.amount_m > worst.amount_m) worst = other;
+  return worst;
 }
 
 double Clearance::slack_m(const ToolPose& tool) const {
@@ -253,9 +297,10 @@ double Clearance::slack_m(const ToolPose& tool) const {
 
 double Clearance::slack_m(const Kinematics& kinematics, const Joints& joints) const {
   const double tool_m = slack_m(kinematics.tool_pose(joints));
-  if (!links_may_touch_ && !links_may_touch_lens_) return tool_m;
+  if (!arm_may_touch()) return tool_m;
   const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
-  return std::min({tool_m, links_slack(table, joints).least_m(), link_lens_gap_m(joints)});
+  return std::min({tool_m, links_slack(table, joints).least_m(), link_lens_gap_m(joints), column_slack(table).least_m(),
+                   column_tool_gap_m(joints)});
 }
 
 }  // namespace hilbrush

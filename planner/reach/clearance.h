@@ -7,10 +7,10 @@
 #include "planner/reach/object_distance.h"
 #include "planner/reach/object_rays.h"
 
-/// Whether the beam, the lens body, the quill and the arm's links are clear of object, post and plate, which to them
-/// are one rigid body, and of each other. Beams are rays (Embree); bodies are rows of balls looked up in a distance
-/// field, which is as fast and was tested against bundles of rays (tests/planner/clearance_test). Thread-safe after
-/// construction.
+/// Whether the beam, the lens body, the quill, the arm's links and the robot's column are clear of object, post and
+/// plate, which to them are one rigid body, and of each other. Beams are rays (Embree); bodies are rows of balls looked
+/// up in a distance field, which is as fast and was tested against bundles of rays (tests/planner/clearance_test).
+/// Thread-safe after construction.
 namespace hilbrush {
 
 enum class Obstruction : std::uint8_t {
@@ -23,7 +23,10 @@ enum class Obstruction : std::uint8_t {
   kQuillTable,
   kLinkObject,
   kLinkTable,
-  kLinkLens
+  kLinkLens,
+  kColumnObject,
+  kColumnTable,
+  kColumnTool
 };
 
 /// What is too near to what, and by how much.
@@ -50,8 +53,8 @@ class Clearance {
   /// The lens alone: it depends on nothing but the dot and the beam's direction in O.
   Obstruction lens_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   Obstruction quill_obstruction(const ToolPose& tool) const;
-  /// Upper arm and forearm, against object, table and the lens. Nothing is computed in a cell whose links run above all
-  /// that.
+  /// Upper arm and forearm, against object, table and the lens; the column, against those, the quill and the forearm.
+  /// Nothing is computed in a cell where they can't meet.
   Obstruction links_obstruction(const TablePose& table, const Joints& joints) const;
 
   /// The same with the amount, for what is told about dots that are skipped.
@@ -96,6 +99,11 @@ class Clearance {
   Slack quill_slack(const ToolPose& tool) const;
   Slack links_slack(const TablePose& table, const Joints& joints) const;
   double link_lens_gap_m(const Joints& joints) const;
+  Slack column_slack(const TablePose& table) const;
+  double column_tool_gap_m(const Joints& joints) const;
+  void lessen(const Capsule& capsule_O, Slack& slack) const;
+  /// Whether anything at all is left to be looked at by links_obstruction().
+  bool arm_may_touch() const { return links_may_touch_ || links_may_touch_lens_ || cell_.arm.column.radius_m > 0; }
   double table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   /// To the plate and the post, in O; exact outside up to the field's range and never more than it is, not above zero
   /// inside.
@@ -104,6 +112,8 @@ class Clearance {
   const CellDescription& cell_;
   double radius_around_tilt_m_, radius_around_rotation_m_;
   bool links_may_touch_ = false, links_may_touch_lens_ = false;
+  bool column_may_touch_ = false;  ///< ... the object or the table
+  double tool_radius_m_;           ///< horizontally, of all that goes with the flange, around its axis
   ObjectRays rays_;
   ObjectDistance distance_;
 };

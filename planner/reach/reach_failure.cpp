@@ -43,6 +43,12 @@ Excuse excuse_of(Obstruction what) {
       return {SkipReason::kArm, "an arm link would touch the table"};
     case Obstruction::kLinkLens:
       return {SkipReason::kArm, "an arm link would touch the lens body"};
+    case Obstruction::kColumnObject:
+      return {SkipReason::kArm, "the object would touch the robot's column"};
+    case Obstruction::kColumnTable:
+      return {SkipReason::kArm, "the table would touch the robot's column"};
+    case Obstruction::kColumnTool:
+      return {SkipReason::kArm, "the arm would touch the robot's column"};
   }
   return {SkipReason::kIncidence, "the face is turned away from every beam"};
 }

@@ -327,6 +327,29 @@ TEST(CellFile, LinksRunAboveTheLensUnlessTheFileSaysWhere) {
   EXPECT_EQ(refusal_of(json).at, "cell.json: $.arm.forearm_radius_mm");
 }
 
+TEST(CellFile, TheColumnEndsUnderTheUpperArmUnlessTheFileSaysWhere) {
+  Json json = Json::parse(default_text());
+  CellDescription cell = cell_from_json(json.dump(), "");
+  EXPECT_DOUBLE_EQ(cell.arm.column.radius_m, .06);
+  EXPECT_DOUBLE_EQ(cell.arm.column.height_m, .36);
+
+  json["arm"].erase("column_height_mm");
+  cell = cell_from_json(json.dump(), "");
+  EXPECT_DOUBLE_EQ(cell.arm.column.height_m, cell.arm.upper_link.height_m - cell.arm.upper_link.radius_m);
+
+  json["arm"]["column_radius_mm"] = 240;
+  cell = cell_from_json(json.dump(), "");
+  ASSERT_EQ(cell_warnings(cell).size(), 1u);
+  EXPECT_TRUE(cell_warnings(cell)[0].starts_with("$.arm.column_radius_mm"));
+  json["arm"]["column_radius_mm"] = -1;
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.arm.column_radius_mm");
+
+  json["arm"].erase("column_radius_mm");
+  EXPECT_EQ(cell_from_json(json.dump(), "").arm.column.radius_m, 0);
+  json["arm"]["column_height_mm"] = 300;
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.arm.column_height_mm");
+}
+
 TEST(CellFile, CellsAreFoundByNameOrPath) {
   EXPECT_EQ(find_cell("default"), shipped("default"));
   EXPECT_EQ(find_cell(shipped("default").string()), shipped("default"));

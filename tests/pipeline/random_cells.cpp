@@ -40,6 +40,8 @@ void shake_arm(CellDescription& cell, Dice& dice) {
   arm.fore_link = {.height_m = top_m, .radius_m = dice.between(.01, .06)};
   arm.upper_link = {.height_m = top_m + dice.between(-.05, .05), .radius_m = dice.between(.01, .06)};
   arm.quill_length_m = std::max(.01, top_m - cell.axes[kJ3].min);
+  arm.column = {};
+  if (dice.once_in(2)) arm.column = {.height_m = dice.between(.05, top_m), .radius_m = dice.between(.02, .15)};
 }
 
 void shake_axes(CellDescription& cell, Dice& dice) {

@@ -227,6 +227,12 @@ const Spoiling kSpoilings[] = {
     {"LowerForearm", "arm touches", [](Work& w) { w.cell.arm.fore_link.height_m = .23; }},
     {"LowerUpperArm", "the upper arm touches",
      [](Work& w) { w.cell.arm.upper_link = {.height_m = .15, .radius_m = .2}; }},
+    {"WiderColumn", "the robot's column", [](Work& w) { w.cell.arm.column.radius_m = .2; }},
+    {"ColumnUnderTheTable", "the robot's column touches the",
+     [](Work& w) {
+       // The table stands in it; the arm passes above.
+       w.cell.arm.column = {.height_m = .12, .radius_m = .3};
+     }},
     {"ScreenInTheQuill", "the quill touches",
      [](Work& w) { w.add_screen(w.tool(kVictim).up_O, w.flange_O(kVictim) + .05 * w.tool(kVictim).up_O); }},
     {"WiderPlate", "the table",

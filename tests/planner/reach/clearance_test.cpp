@@ -101,6 +101,41 @@ TEST(Clearance, LinksAgreeWithTheIndependentCheck) {
   EXPECT_GT(clear, 3000U);
 }
 
+/// The same of the column: against lens, quill and forearm, and against what stands on the table.
+TEST(Clearance, TheColumnAgreesWithTheIndependentCheck) {
+  constexpr unsigned kSeed = 43;
+  CellDescription cell = default_cell();
+  cell.arm.column = {.height_m = .3, .radius_m = .11};
+  cell.arm.fore_link = {.height_m = .31, .radius_m = .03};
+  const TexturedMesh mesh = ball(.07);
+  const Clearance clearance(mesh, cell);
+  const Kinematics kinematics(cell);
+  const CheckCell check(mesh, cell);
+  std::mt19937 random(kSeed);
+  std::size_t tool = 0, table = 0, clear = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    Joints joints;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      joints[axis] = std::uniform_real_distribution<double>(cell.axes[axis].min, cell.axes[axis].max)(random);
+    joints[kTilt] = std::max(joints[kTilt], .8);  // the ball leans towards the robot
+    const TablePose pose = kinematics.table_pose(joints[kTilt], joints[kRotation]);
+    const bool is_clear = clearance.links_obstruction(pose, joints) == Obstruction::kNone;
+    const std::string fault = check.body_fault(joints);
+    if (fault.find("column") != std::string::npos) {
+      EXPECT_FALSE(is_clear) << fault << ", seed " << kSeed << ", look " << n;
+      EXPECT_LE(clearance.slack_m(kinematics, joints), 0) << fault << ", seed " << kSeed << ", look " << n;
+      ++(fault.starts_with("the robot's column") ? table : tool);
+    }
+    clear += is_clear;
+    if (clearance.slack_m(kinematics, joints) > 0) {
+      EXPECT_EQ(fault, "") << "seed " << kSeed << ", look " << n;
+    }
+  }
+  EXPECT_GT(tool, 100U);
+  EXPECT_GT(table, 100U);
+  EXPECT_GT(clear, 1000U);
+}
+
 TEST(Clearance, LinksOfTheShippedCellCannotTouchAnything) {
   const CellDescription cell = default_cell();
   const Clearance clearance(ball(.04), cell);
@@ -109,6 +144,14 @@ TEST(Clearance, LinksOfTheShippedCellCannotTouchAnything) {
     Joints joints{.3, -.6, .3, 0, tilt, 0};
     EXPECT_EQ(clearance.links_obstruction(kinematics.table_pose(tilt, 0), joints), Obstruction::kNone);
   }
+}
+
+TEST(ArmLinks, TheColumnHasAFlatTop) {
+  CellDescription::Arm arm;
+  arm.column = {.height_m = .3, .radius_m = .1};
+  EXPECT_NEAR(column_gap_m(arm, {{.3, 0, .1}, {.3, 0, .2}, .05}), .15, 1e-12);             // beside it
+  EXPECT_NEAR(column_gap_m(arm, {{-.5, 0, .37}, {.5, 0, .37}, .05}), .02, 1e-12);          // across its top
+  EXPECT_NEAR(column_gap_m(arm, {{-.5, .12, .2}, {.5, .12, .2}, .05}), .12 - .15, 1e-12);  // through it
 }
 
 TEST(ArmLinks, GapOfCapsules) {

@@ -115,6 +115,18 @@ TEST(Reach, ALowForearmTouchesTheObject) {
   EXPECT_GT(skipped.amount, 0);
 }
 
+TEST(Reach, AWideColumnIsNamed) {
+  CellDescription cell = default_cell();
+  cell.arm.column = {.height_m = .36, .radius_m = .34};  // the arm can't work above the table
+  cell.table.tilt_axis_W.x() = .3;
+  const Reach reach(ball(.02), cell, {});
+  SkippedDot skipped;
+  EXPECT_FALSE(reach.is_reachable({0, 0, .04}, {0, 0, 1}, &skipped));
+  EXPECT_EQ(skipped.reason, SkipReason::kArm) << skipped.detail;
+  EXPECT_NE(skipped.detail.find("the robot's column"), std::string::npos) << skipped.detail;
+  EXPECT_GT(skipped.amount, 0);
+}
+
 /// The egg-cup shapes, whatever is out of reach, and every reason there is.
 TEST(Reach, WhatIsSkippedIsOutOfReachOfAFineGridOfPoses) {
   struct Case {
@@ -128,6 +140,7 @@ TEST(Reach, WhatIsSkippedIsOutOfReachOfAFineGridOfPoses) {
       {"short tilt", ball(.02), [](CellDescription& c) { c.axes[kTilt].max = .5; }},
       {"narrow elbow", ball(.02), [](CellDescription& c) { c.axes[kJ2].min = 1.9, c.axes[kJ2].max = 2.2; }},
       {"low forearm", ball(.02), [](CellDescription& c) { c.arm.fore_link.height_m = .24; }},
+      {"wide column", ball(.02), [](CellDescription& c) { c.arm.column.radius_m = .16; }},
       {"thick lens", drilled_block(), [](CellDescription& c) { c.lens.near_m = .02; }}};
   constexpr std::size_t kLooks = 12;
   for (const Case& one : cases) {
