@@ -84,6 +84,19 @@ bool Kinematics::solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elb
   return true;
 }
 
+Joints Kinematics::per_yaw(const Joints& joints) const {
+  const double forearm_angle = joints[kJ1] + joints[kJ2], tool_yaw = yaw(joints);
+  // The flange circles around the focus.
+  const Eigen::Vector2d flange_W =
+      cell_.arm.flange_to_focus_m * cos_e_ * Eigen::Vector2d(std::sin(tool_yaw), -std::cos(tool_yaw));
+  const Eigen::Vector2d upper(std::cos(joints[kJ1]), std::sin(joints[kJ1]));
+  const Eigen::Vector2d fore(std::cos(forearm_angle), std::sin(forearm_angle));
+  const double sin_j2 = std::sin(joints[kJ2]);
+  const double j1 = flange_W.dot(fore) / (cell_.arm.upper_arm_m * sin_j2);
+  const double forearm = -flange_W.dot(upper) / (cell_.arm.forearm_m * sin_j2);
+  return {j1, forearm - j1, 0, 1 - forearm, 0, 0};
+}
+
 LimitExcess Kinematics::limit_excess(const Joints& joints) const {
   LimitExcess worst{0, -std::numeric_limits<double>::infinity()};
   double worst_share = -std::numeric_limits<double>::infinity();

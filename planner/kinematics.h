@@ -52,6 +52,10 @@ class Kinematics {
   bool solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elbow, Joints& joints,
                  double* rim_excess_m = nullptr) const;
 
+  /// How the joints follow the yaw while the focus stays where it is, rad/rad: J1, J2 and J4; zero for the others.
+  /// Without end at the straight arm.
+  Joints per_yaw(const Joints& joints) const;
+
   /// Against the limits with margin; J2 also keeps clear of the straight arm.
   LimitExcess limit_excess(const Joints& joints) const;
   /// The limits that planning keeps: the cell's without its margin.

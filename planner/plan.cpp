@@ -62,7 +62,7 @@ TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& prog
   const auto move_to = [&](const Joints& to, double& spent_s) {
     const double travel_s = move_s(cell, at, to);
     ringing_s = std::max(settle_s(cell, at, to), ringing_s - travel_s);
-    spent_s += travel_s + cell.timing.message_s;
+    spent_s += travel_s + cell.timing.message_s + cell.timing.move_delay_s;
     at = to;
   };
   std::size_t next_via = 0;
@@ -81,6 +81,13 @@ TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& prog
     if (visit) visit(i, time);
   }
   return time;
+}
+
+double least_time_s(const CellDescription& cell, const ExposureProgram& program) {
+  double sum_s = 0;
+  for (const Exposure& exposure : program.exposures)
+    sum_s += cell.timing.settle_min_s + static_cast<double>(exposure.pulse_s) + cell.timing.tick_s;
+  return sum_s;
 }
 
 std::vector<Joints> plan_approach(const Reach& reach, const ExposureProgram& program, std::size_t next,

@@ -79,6 +79,9 @@ using TimeVisitor = std::function<void(std::size_t exposure, const TimeSplit& so
 /// How long a program takes from home to home, by the time model.
 TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program, const TimeVisitor& visit = {});
 
+/// What no order and no poses can beat: each exposure's shortest settling, its pulse and a move of one control tick.
+double least_time_s(const CellDescription& cell, const ExposureProgram& program);
+
 /// The checked way from measured joints to exposure `next` of the program: way-points, possibly none (the direct move
 /// is clear).
 /// @throws InputError if there is no clear way.

@@ -8,6 +8,8 @@
 #include <limits>
 #include <numbers>
 
+#include "planner/reach/beam_directions.h"
+
 namespace hilbrush {
 namespace {
 
@@ -18,25 +20,10 @@ constexpr std::size_t kBlock = 1 << 12;  // dots whose aims are chosen together
 constexpr std::size_t kBlocksAtOnce = 16;
 constexpr int kExchangeRounds = 2;
 
-/// Evenly spread over the sphere (Fibonacci lattice).
-std::vector<Eigen::Vector3d> directions_over_sphere(double spacing) {
-  const auto count = static_cast<std::size_t>(4 * std::numbers::pi / (.866 * spacing * spacing));
-  std::vector<Eigen::Vector3d> directions;
-  directions.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double z = 1 - (2 * static_cast<double>(i) + 1) / static_cast<double>(count);
-    const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.)), r = std::sqrt(1 - z * z);
-    directions.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
-  }
-  return directions;
-}
-
 /// Facility location: which of the candidate directions become aims.
 class AimLocation {
  public:
-  AimLocation(const AimedDots& dots, const AimCosts& costs)
-      : dots_(dots), costs_(costs), directions_(directions_over_sphere(costs.spacing)) {
-    remove_unattainable();
+  AimLocation(const AimedDots& dots, const AimCosts& costs) : dots_(dots), costs_(costs), directions_(costs.spacing) {
     ask_sample();
   }
 
@@ -59,52 +46,23 @@ class AimLocation {
     float cost_s;
   };
 
-  /// Directions that no tilt and yaw give, or that bring the arm out of reach of the middle of the dots.
-  void remove_unattainable() {
-    Eigen::Vector3d middle_O = Eigen::Vector3d::Zero();
-    const std::size_t count = dots_.size(), step = std::max<std::size_t>(1, count / 256);
-    std::size_t summed = 0;
-    for (std::size_t i = 0; i < count; i += step, ++summed) middle_O += dots_.position_O(i);
-    if (summed > 0) middle_O /= static_cast<double>(summed);
-    const auto& reach = dots_.reach();
-    const auto is_attainable = [&](const Eigen::Vector3d& beam_O) {
-      for (const double tilt : reach.tilts()) {
-        TableSolution solutions[2];
-        const int found = solve_table(reach.kinematics, tilt, beam_O, solutions);
-        for (int s = 0; s < found; ++s)
-          for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
-            Joints joints{};
-            const TablePose table = reach.kinematics.table_pose(tilt, solutions[s].rotation);
-            if (reach.kinematics.solve_arm(table.to_W(middle_O), solutions[s].yaw, elbow, joints)) return true;
-          }
-      }
-      return false;
-    };
-    std::erase_if(directions_, [&](const Eigen::Vector3d& beam_O) { return !is_attainable(beam_O); });
-  }
-
   void ask_sample() {
     const std::size_t asked = std::min(dots_.size(), costs_.sample);
     weight_ = asked > 0 ? static_cast<double>(dots_.size()) / static_cast<double>(asked) : 0;
-    std::vector<std::vector<std::pair<std::uint32_t, float>>> answers(asked);
+    served_.resize(asked);
     const double cos_preferred = std::cos(kept_incidence(dots_.reach().options));
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, asked, 16), [&](const auto& range) {
       for (std::size_t s = range.begin(); s < range.end(); ++s) {
         const Target target = dots_.target(s * dots_.size() / asked);
-        for (std::uint32_t d = 0; d < directions_.size(); ++d) {
+        for (const std::uint32_t d : directions_.that_hit(dots_.reach(), target, cos_preferred)) {
           const double cosine = -directions_[d].dot(target.smooth_normal_O);
-          if (cosine >= cos_preferred && dots_.is_clear(target, directions_[d]))
-            answers[s].emplace_back(d, static_cast<float>(incidence_cost_s(costs_, cosine)));
+          served_[s].emplace_back(d, static_cast<float>(incidence_cost_s(costs_, cosine)));
         }
       }
     });
     serves_.resize(directions_.size());
     for (std::uint32_t s = 0; s < asked; ++s)
-      for (const auto& [d, cost_s] : answers[s]) serves_[d].push_back({s, cost_s});
-    served_.resize(asked);
-    for (std::uint32_t s = 0; s < asked; ++s) {
-      for (const auto& [d, cost_s] : answers[s]) served_[s].emplace_back(d, cost_s);
-    }
+      for (const auto& [d, cost_s] : served_[s]) serves_[d].push_back({s, cost_s});
     cost_s_.assign(asked, static_cast<float>(kUnservedS));
     is_open_.assign(directions_.size(), false);
   }
@@ -162,7 +120,7 @@ class AimLocation {
 
   const AimedDots& dots_;
   const AimCosts& costs_;
-  std::vector<Eigen::Vector3d> directions_;
+  BeamDirections directions_;
   std::vector<std::vector<Service>> serves_;                          ///< by direction
   std::vector<std::vector<std::pair<std::uint32_t, float>>> served_;  ///< by sample
   std::vector<float> cost_s_;                                         ///< of each sample with the open aims
@@ -198,7 +156,7 @@ class BlockOfAims {
     const double cos_preferred = std::cos(kept_incidence(dots_.reach().options));
     for (std::size_t k = 0; k < beams_O_.size(); ++k) {
       const double cosine = -beams_O_[k].dot(target.smooth_normal_O);
-      if (cosine >= cos_preferred && dots_.is_clear(target, beams_O_[k]))
+      if (cosine >= cos_preferred && dots_.reach().is_clear(target, beams_O_[k]))
         candidates_.push_back({static_cast<std::uint16_t>(k), static_cast<float>(incidence_cost_s(costs_, cosine))});
     }
   }
@@ -264,18 +222,12 @@ double incidence_cost_s(const AimCosts& costs, double cosine) {
   return costs.incidence_s * incidence * incidence;
 }
 
-bool AimedDots::is_clear(const Target& target, const Eigen::Vector3d& beam_O) const {
-  return -beam_O.dot(target.face_normal_O) >= reach_.cos_max_incidence() &&
-         reach_.clearance.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
-         reach_.clearance.beam_obstruction(target.position_O, beam_O) == Obstruction::kNone;
-}
-
 AimCosts aim_costs(const PlanOptions& options) {
   switch (options.planning) {
     case Planning::kFast:
       return {.incidence_s = .001, .aim_s = .6, .switch_s = .02, .spacing = 7 * kDegree, .sample = 1500, .kicks = 2};
     case Planning::kBalanced:
-      return {.incidence_s = .008, .aim_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000, .kicks = 2};
+      return {.incidence_s = .0025, .aim_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000, .kicks = 2};
     case Planning::kQuality:
       break;
   }

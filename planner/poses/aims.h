@@ -23,9 +23,6 @@ class AimedDots {
   const Eigen::Vector3d& position_O(std::size_t i) const { return dots_.dots[dot_indices_[i]].position_O; }
   const Reach::Implementation& reach() const { return reach_; }
 
-  /// Whether the beam meets the dot within the cone and passes everything; the arm is not looked at.
-  bool is_clear(const Target& target, const Eigen::Vector3d& beam_O) const;
-
  private:
   const Reach::Implementation& reach_;
   const DotSequence& dots_;

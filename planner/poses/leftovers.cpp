@@ -80,7 +80,7 @@ class Leftovers {
   bool serves(const Station& station, const Eigen::Vector3d& beam_O, const Leftover& leftover) const {
     const Target target = dots_.target(leftover.dot);
     return -beam_O.dot(target.smooth_normal_O) >= leftover.cos_allowed &&
-           joints_at(reach_, station, target.position_O, {}) && dots_.is_clear(target, beam_O);
+           joints_at(reach_, station, target.position_O, {}) && reach_.is_clear(target, beam_O);
   }
   Eigen::Vector3d beam_of(const Station& station) const {
     return reach_.kinematics.table_pose(station.tilt, station.rotation).R_WO.transpose() *

@@ -14,6 +14,8 @@ constexpr std::int64_t kKickWindow = 1000;
 constexpr std::size_t kBlock = 1 << 15;  // dots that are improved together
 constexpr std::int32_t kNone = -1;       // beyond an end of the path
 constexpr float kLeastGainS = 1e-6F;
+/// What turning the tool saves a step is not always to be had, because turns add up.
+constexpr float kHopedFor = .7F;
 
 /// The cost of a step; beyond the ends of the path there is none.
 class PathCost {
@@ -22,7 +24,8 @@ class PathCost {
 
   float operator()(std::int32_t a, std::int32_t b) const {
     if (a == kNone || b == kNone) return 0;
-    return step_(path_[static_cast<std::size_t>(a)].arm, path_[static_cast<std::size_t>(b)].arm);
+    const PathDot &from = path_[static_cast<std::size_t>(a)], &to = path_[static_cast<std::size_t>(b)];
+    return step_.with_turn(from.arm, to.arm, from.per_yaw, to.per_yaw, kHopedFor);
   }
 
  private:

@@ -16,6 +16,7 @@ namespace hilbrush {
 struct PathDot {
   Eigen::Vector3f position_O;
   ArmJoints arm;
+  ArmJoints per_yaw{};  ///< how the joints follow the yaw; zero: the tool does not turn
 };
 
 /// Which dot comes at which place, ends free. `kicks` a dot: so often a neighbourhood is disturbed and improved again

@@ -72,8 +72,8 @@ std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, T
     std::vector<PathDot> path;
     path.reserve(joints.size());
     for (std::size_t i = 0; i < joints.size(); ++i) {
-      path.push_back({dots.position_O(tour.dots[i]).cast<float>(), {}});
-      for (std::size_t axis = 0; axis < 4; ++axis) path.back().arm[axis] = static_cast<float>(joints[i][axis]);
+      path.push_back({dots.position_O(tour.dots[i]).cast<float>(), arm_of(joints[i]),
+                      arm_of(reach.kinematics.per_yaw(joints[i]))});
     }
     const std::vector<std::uint32_t> order = improved_order(reach.cell, path, costs.kicks);
     const std::vector<Joints> old_joints = joints;

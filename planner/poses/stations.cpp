@@ -29,7 +29,8 @@ double repose_s(const CellDescription& cell, const Joints& a, const Joints& b) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     double distance = std::abs(a[i] - b[i]);
     if (i == kRotation || i == kJ4) distance = std::abs(std::remainder(distance, kTurn));
-    slowest_s = std::max(slowest_s, trapezoid_s(distance, cell.axes[i].speed_max, cell.axes[i].acceleration_max));
+    slowest_s = std::max(slowest_s, cell.axes[i].time_factor *
+                                        trapezoid_s(distance, cell.axes[i].speed_max, cell.axes[i].acceleration_max));
   }
   const bool is_flip = (a[kJ2] >= 0) != (b[kJ2] >= 0);
   return slowest_s + (is_flip ? 2 * cell.timing.retract_s : 0);

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "planner/cell_description.h"
+#include "planner/kinematics.h"
 
 /// The time model for what search asks millions of times: move and settle between two exposures from one pose of the
 /// table, in single precision. Agrees with move_s() + settle_s() - settle_min_s to a rounding.
@@ -12,6 +12,11 @@ namespace hilbrush {
 /// J1..J4.
 using ArmJoints = std::array<float, 4>;
 
+inline ArmJoints arm_of(const Joints& joints) {
+  return {static_cast<float>(joints[kJ1]), static_cast<float>(joints[kJ2]), static_cast<float>(joints[kJ3]),
+          static_cast<float>(joints[kJ4])};
+}
+
 class StepCost {
  public:
   explicit StepCost(const CellDescription& cell)
@@ -19,20 +24,58 @@ class StepCost {
         settle_span_s_(static_cast<float>(cell.timing.settle_max_s - cell.timing.settle_min_s)) {
     for (std::size_t i = 0; i < 4; ++i) {
       const AxisDescription& axis = cell.axes[i];
-      inverse_acceleration_[i] = static_cast<float>(1 / axis.acceleration_max);
+      const double factor = axis.time_factor;
+      inverse_acceleration_[i] = static_cast<float>(factor * factor / axis.acceleration_max);
       ramps_[i] = static_cast<float>(axis.speed_max * axis.speed_max / axis.acceleration_max);
-      inverse_speed_[i] = static_cast<float>(1 / axis.speed_max);
-      ramp_s_[i] = static_cast<float>(axis.speed_max / axis.acceleration_max);
+      inverse_speed_[i] = static_cast<float>(factor / axis.speed_max);
+      ramp_s_[i] = static_cast<float>(factor * axis.speed_max / axis.acceleration_max);
       inverse_saturation_[i] = axis.settle_saturation > 0 ? static_cast<float>(1 / axis.settle_saturation) : 0;
     }
   }
 
   /// Seconds above the shortest settling.
-  float operator()(const ArmJoints& from, const ArmJoints& to) const {
+  float operator()(const ArmJoints& from, const ArmJoints& to) const { return cost_s(difference(from, to)); }
+
+  /// The same if the tool turns a little on the way, by as much as serves the step best: J1, J2 and J4 then share what
+  /// would be the first two's alone. `per_yaw`: how the joints follow the yaw at either end. Symmetric.
+  /// `share` of what that saves is taken off.
+  float with_turn(const ArmJoints& from, const ArmJoints& to, const ArmJoints& from_per_yaw,
+                  const ArmJoints& to_per_yaw, float share = 1) const {
+    const ArmJoints step = difference(from, to);
+    const float plain_s = cost_s(step);
+    // One tick is the least; and no turn helps J3.
+    if (plain_s <= std::max(1.5F * tick_s_, axis_s(2, std::abs(step[2])))) return plain_s;
+    std::array<float, 3> at, slope;
+    ArmJoints rate{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t i = kTurning[k];
+      rate[i] = .5F * (from_per_yaw[i] + to_per_yaw[i]);
+      at[k] = step[i] * inverse_acceleration_[i];
+      slope[k] = rate[i] * inverse_acceleration_[i];
+    }
+    const float turn = least_maximum(at, slope);
+    ArmJoints turned = step;
+    for (const std::size_t i : kTurning) turned[i] += turn * rate[i];
+    return plain_s - share * std::max(0.F, plain_s - cost_s(turned));
+  }
+
+ private:
+  static constexpr std::array<std::size_t, 3> kTurning{0, 1, 3};
+
+  static ArmJoints difference(const ArmJoints& from, const ArmJoints& to) {
+    return {to[0] - from[0], to[1] - from[1], to[2] - from[2], to[3] - from[3]};
+  }
+
+  float axis_s(std::size_t i, float distance) const {
+    return distance <= ramps_[i] ? 2 * std::sqrt(distance * inverse_acceleration_[i])
+                                 : distance * inverse_speed_[i] + ramp_s_[i];
+  }
+
+  float cost_s(const ArmJoints& step) const {
     float ramping = 0, cruising_s = 0,
           share = 0;  // the slowest of those that do not reach full speed, and of those that do
     for (std::size_t i = 0; i < 4; ++i) {
-      const float distance = std::abs(from[i] - to[i]);
+      const float distance = std::abs(step[i]);
       share = std::max(share, distance * inverse_saturation_[i]);
       if (distance <= ramps_[i])
         ramping = std::max(ramping, distance * inverse_acceleration_[i]);
@@ -44,7 +87,25 @@ class StepCost {
     return move_s + settle_span_s_ * std::min(1.F, share);
   }
 
- private:
+  /// Where the largest of |at + slope * x| is least: two of them are equal there.
+  static float least_maximum(const std::array<float, 3>& at, const std::array<float, 3>& slope) {
+    const auto largest = [&](float x) {
+      return std::max({std::abs(at[0] + slope[0] * x), std::abs(at[1] + slope[1] * x), std::abs(at[2] + slope[2] * x)});
+    };
+    float best = 0, least = largest(0);
+    const auto consider = [&](float difference, float slope_difference) {
+      if (std::abs(slope_difference) < 1e-12F) return;
+      const float x = -difference / slope_difference, value = largest(x);
+      if (value < least) least = value, best = x;
+    };
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t j = (i + 1) % 3;
+      consider(at[i] - at[j], slope[i] - slope[j]);
+      consider(at[i] + at[j], slope[i] + slope[j]);
+    }
+    return best;
+  }
+
   float tick_s_, settle_span_s_;
   std::array<float, 4> inverse_acceleration_{}, ramps_{}, inverse_speed_{}, ramp_s_{}, inverse_saturation_{};
 };

@@ -10,11 +10,21 @@
 namespace hilbrush {
 namespace {
 
-constexpr int kYaws = 25;           // that a dot may have, the station's in the middle
-constexpr int kLongestTurn = 8;     // between two dots, in steps
-constexpr double kStepShare = .25;  // of the typical distance between dots, that one step of yaw moves the focus by
-constexpr double kStepMin = .05 * std::numbers::pi / 180, kStepMax = std::numbers::pi / 180;
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kWidest = 8 * kDegree;  // that the tool turns away from the station's yaw
+constexpr int kFinePerCoarse = 4;
+constexpr int kMostToOneSide = 127;   // what back-pointers of a byte tell apart
+constexpr std::size_t kBlock = 8192;  // dots whose yaws are chosen together
 constexpr float kNever = std::numeric_limits<float>::infinity();
+
+/// The yaws that a dot may have: so many to either side of a middle one, and how far apart those of two dots may be.
+struct YawGrid {
+  double step;  ///< rad
+  int half;
+  int longest_turn;  ///< between two dots, in steps
+
+  int count() const { return 2 * half + 1; }
+};
 
 class YawPath {
  public:
@@ -27,46 +37,80 @@ class YawPath {
         table_(reach_.kinematics.table_pose(station.tilt, station.rotation)),
         tour_(tour),
         joints_(joints),
-        cost_(reach_.cell) {
-    const double focus_m = reach_.cell.arm.flange_to_focus_m * reach_.kinematics.cos_depression();
-    step_ = focus_m > 0 ? std::clamp(kStepShare * typical_distance_m() / focus_m, kStepMin, kStepMax) : kStepMin;
-  }
+        cost_(reach_.cell),
+        steps_away_(tour.size(), 0) {}
 
+  /// First roughly, as far as the tool may turn; then in small steps around that.
   void improve() {
-    from_.assign(tour_.size() * kYaws, 0);
-    Row before = row(0), now;
-    for (std::size_t i = 1; i < tour_.size(); ++i) {
-      now = row(i);
-      connect(before, now, &from_[i * kYaws]);
-      before = now;
-    }
-    int best = kYaws / 2;
-    for (int y = 0; y < kYaws; ++y)
-      if (before.cost_s[y] < before.cost_s[best]) best = y;
-    for (std::size_t i = tour_.size(); i-- > 0;) {
-      const int y = best;
-      best = from_[i * kYaws + static_cast<std::size_t>(y)];
-      if (y != kYaws / 2) turn(i, offset(y));
-    }
+    const double fine = one_tick_turn() / kFinePerCoarse;
+    const double coarse = kFinePerCoarse * fine;
+    const YawGrid coarse_grid{coarse, std::min(kMostToOneSide, static_cast<int>(kWidest / coarse)), 4};
+    const YawGrid fine_grid{fine, 12, 8};
+    for (std::size_t i = 0; i < tour_.size(); ++i) clear_.push_back({clear_turn(i, -1), clear_turn(i, 1)});
+    choose(coarse_grid);
+    for (int& steps : steps_away_) steps *= kFinePerCoarse;
+    choose(fine_grid);
+    for (std::size_t i = 0; i < tour_.size(); ++i)
+      if (steps_away_[i] != 0) turn(i, steps_away_[i] * fine);
   }
 
  private:
   /// A dot at all its yaws.
   struct Row {
-    std::array<float, kYaws> cost_s;
-    std::array<ArmJoints, kYaws> arm;
+    std::vector<float> cost_s;
+    std::vector<ArmJoints> arm;
+    int middle = 0;  ///< in steps away from the station's yaw
   };
 
-  double offset(int y) const { return (y - kYaws / 2) * step_; }
+  /// What J4 turns by in one control tick: longer turns make steps longer.
+  double one_tick_turn() const {
+    const double half_tick_s = reach_.cell.timing.tick_s / 2;
+    return std::clamp(reach_.cell.axes[kJ4].acceleration_max * half_tick_s * half_tick_s, .04 * kDegree, .4 * kDegree);
+  }
 
-  double typical_distance_m() const {
-    std::vector<double> distances;
-    for (std::size_t i = 1; i < tour_.size(); i += 1 + tour_.size() / 200)
-      distances.push_back((dots_.position_O(tour_[i]) - dots_.position_O(tour_[i - 1])).norm());
-    if (distances.empty()) return 0;
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    return *middle;
+  /// How far the tool may turn to one side so that beam and lens still pass everything.
+  float clear_turn(std::size_t i, int side) const {
+    constexpr int kTried = 5;
+    const Eigen::Vector3d& position_O = dots_.position_O(tour_[i]);
+    for (int k = kTried; k > 0; --k) {
+      const double turn = kWidest * k / kTried;
+      const Eigen::Vector3d beam_O = table_.R_WO.transpose() * reach_.kinematics.beam_W(station_.yaw + side * turn);
+      if (reach_.clearance.lens_obstruction(position_O, beam_O) == Obstruction::kNone &&
+          reach_.clearance.beam_obstruction(position_O, beam_O) == Obstruction::kNone)
+        return static_cast<float>(turn);
+    }
+    return 0;
+  }
+
+  /// The cheapest way through the grid around where each dot's yaw is now.
+  void choose(const YawGrid& grid) {
+    for (std::size_t begin = 0; begin < tour_.size(); begin += kBlock)
+      choose(grid, begin, std::min(tour_.size(), begin + kBlock));
+  }
+
+  void choose(const YawGrid& grid, std::size_t begin, std::size_t end) {
+    const auto count = static_cast<std::size_t>(grid.count());
+    from_.assign((end - begin) * count, 0);
+    Row before, now;
+    fill(grid, begin, before);
+    if (begin > 0) {  // goes on from what was chosen before
+      Row chosen;
+      fill(grid, begin - 1, chosen);
+      for (std::size_t y = 0; y < count; ++y)
+        if (static_cast<int>(y) != grid.half) chosen.cost_s[y] = kNever;
+      connect(grid, chosen, before, from_.data());
+    }
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      fill(grid, i, now);
+      connect(grid, before, now, &from_[(i - begin) * count]);
+      std::swap(before, now);
+    }
+    auto best =
+        static_cast<std::size_t>(std::min_element(before.cost_s.begin(), before.cost_s.end()) - before.cost_s.begin());
+    for (std::size_t i = end; i-- > begin;) {
+      steps_away_[i] += static_cast<int>(best) - grid.half;
+      best = from_[(i - begin) * count + best];
+    }
   }
 
   bool solve(std::size_t i, double yaw, Joints& joints) const {
@@ -77,38 +121,41 @@ class YawPath {
     return true;
   }
 
-  Row row(std::size_t i) const {
+  void fill(const YawGrid& grid, std::size_t i, Row& row) const {
     const Target target = dots_.target(tour_[i]);
     const Eigen::Vector3d smooth_W = table_.R_WO * target.smooth_normal_O, face_W = table_.R_WO * target.face_normal_O;
     const double nominal = -reach_.kinematics.beam_W(station_.yaw).dot(smooth_W);
     const double cos_least = std::min(nominal, std::cos(kept_incidence(reach_.options))) - 1e-9;
-    Row row;
-    for (int y = 0; y < kYaws; ++y) {
-      const Eigen::Vector3d beam_W = reach_.kinematics.beam_W(station_.yaw + offset(y));
+    row.middle = steps_away_[i];
+    row.cost_s.assign(static_cast<std::size_t>(grid.count()), kNever);
+    row.arm.assign(row.cost_s.size(), arm_of(joints_[i]));
+    for (int y = 0; y < grid.count(); ++y) {
+      const int steps = row.middle + y - grid.half;
+      const double turn = steps * grid.step, yaw = station_.yaw + turn;
+      if (turn < -static_cast<double>(clear_[i][0]) || turn > static_cast<double>(clear_[i][1])) continue;
+      const Eigen::Vector3d beam_W = reach_.kinematics.beam_W(yaw);
       const double cosine = -beam_W.dot(smooth_W);
-      Joints joints{};
-      const bool is_possible = cosine >= cos_least && -beam_W.dot(face_W) >= reach_.cos_max_incidence() &&
-                               solve(i, station_.yaw + offset(y), joints);
-      const auto k = static_cast<std::size_t>(y);
-      row.cost_s[k] = is_possible ? static_cast<float>(incidence_cost_s(costs_, cosine)) : kNever;
-      for (std::size_t axis = 0; axis < 4; ++axis) row.arm[k][axis] = static_cast<float>(joints[axis]);
+      if (steps != 0 && (cosine < cos_least || -beam_W.dot(face_W) < reach_.cos_max_incidence())) continue;
+      Joints joints = joints_[i];
+      if (steps != 0 && !solve(i, yaw, joints)) continue;
+      row.cost_s[static_cast<std::size_t>(y)] = static_cast<float>(incidence_cost_s(costs_, cosine));
+      row.arm[static_cast<std::size_t>(y)] = arm_of(joints);
     }
-    const std::size_t middle = kYaws / 2;
-    row.cost_s[middle] = static_cast<float>(incidence_cost_s(costs_, nominal));
-    for (std::size_t axis = 0; axis < 4; ++axis) row.arm[middle][axis] = static_cast<float>(joints_[i][axis]);
-    return row;
   }
 
-  void connect(const Row& before, Row& now, std::uint8_t* from) const {
-    const float offset_s = *std::min_element(before.cost_s.begin(), before.cost_s.end());
-    for (int y = 0; y < kYaws; ++y) {
+  void connect(const YawGrid& grid, const Row& before, Row& now, std::uint8_t* from) const {
+    const auto best_before = std::min_element(before.cost_s.begin(), before.cost_s.end());
+    const int shift = now.middle - before.middle;
+    for (int y = 0; y < grid.count(); ++y) {
       const auto k = static_cast<std::size_t>(y);
       if (now.cost_s[k] == kNever) continue;
       float least_s = kNever;
-      for (int x = std::max(0, y - kLongestTurn); x <= std::min(kYaws - 1, y + kLongestTurn); ++x) {
+      const int low = std::max(0, y + shift - grid.longest_turn);
+      const int high = std::min(grid.count() - 1, y + shift + grid.longest_turn);
+      for (int x = low; x <= high; ++x) {
         const auto j = static_cast<std::size_t>(x);
         if (before.cost_s[j] >= least_s) continue;
-        const float cost_s = before.cost_s[j] - offset_s + cost_(before.arm[j], now.arm[k]);
+        const float cost_s = before.cost_s[j] - *best_before + cost_(before.arm[j], now.arm[k]);
         if (cost_s >= least_s) continue;
         least_s = cost_s;
         from[y] = static_cast<std::uint8_t>(x);
@@ -116,10 +163,9 @@ class YawPath {
       now.cost_s[k] = least_s == kNever ? kNever : now.cost_s[k] + least_s;
     }
     if (*std::min_element(now.cost_s.begin(), now.cost_s.end()) != kNever) return;
-    // Too far a turn away from everything before: begin again from the station's own yaw.
-    now.cost_s[kYaws / 2] = 0;
-    from[kYaws / 2] =
-        static_cast<std::uint8_t>(std::min_element(before.cost_s.begin(), before.cost_s.end()) - before.cost_s.begin());
+    // Too far a turn away from everything before: begin again from the middle.
+    now.cost_s[static_cast<std::size_t>(grid.half)] = 0;
+    from[grid.half] = static_cast<std::uint8_t>(best_before - before.cost_s.begin());
   }
 
   void turn(std::size_t i, double offset) {
@@ -128,7 +174,7 @@ class YawPath {
     const double yaw = station_.yaw + offset;
     if (!reach_.arm_fits(table_, target.position_O, yaw, station_.elbow, joints_[i], joints, nullptr)) return;
     if (std::abs(joints[kJ4] - joints_[i][kJ4]) > 1) return;  // it would unwind
-    if (dots_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics.beam_W(yaw))) joints_[i] = joints;
+    if (reach_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics.beam_W(yaw))) joints_[i] = joints;
   }
 
   const AimedDots& dots_;
@@ -139,8 +185,9 @@ class YawPath {
   std::span<const std::uint32_t> tour_;
   std::span<Joints> joints_;
   StepCost cost_;
-  double step_ = 0;
-  std::vector<std::uint8_t> from_;
+  std::vector<int> steps_away_;              ///< of each dot, from the station's yaw, in steps of the grid
+  std::vector<std::array<float, 2>> clear_;  ///< of each dot, how far the tool may turn either way, rad
+  std::vector<std::uint8_t> from_;           ///< of each yaw of each dot of a block, the yaw before
 };
 
 }  // namespace

@@ -125,6 +125,19 @@ std::optional<DotPose> Reach::Implementation::pose_for_beam(const Target& target
   return std::nullopt;
 }
 
+bool Reach::Implementation::is_clear(const Target& target, const Eigen::Vector3d& beam_O) const {
+  return -beam_O.dot(target.face_normal_O) >= cos_max_incidence_ &&
+         clearance.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
+         clearance.beam_obstruction(target.position_O, beam_O) == Obstruction::kNone;
+}
+
+bool Reach::Implementation::can_hit(const Target& target, const Eigen::Vector3d& beam_O) const {
+  if (!is_clear(target, beam_O)) return false;
+  const Joints anywhere{};
+  return pose_for_beam(target, beam_O, tilts_, anywhere, nullptr) ||
+         pose_for_beam(target, beam_O, fine_tilts_, anywhere, nullptr);
+}
+
 std::optional<DotPose> Reach::Implementation::search_cone(const Target& target, const Eigen::Vector3d& axis_O,
                                                           const Directions& cone, const std::vector<double>& tilts,
                                                           const Joints& reference, FailureTally* tally) const {
@@ -132,6 +145,8 @@ std::optional<DotPose> Reach::Implementation::search_cone(const Target& target, 
   for (const Eigen::Vector3d& direction : cone) {
     const Eigen::Vector3d beam_O = -(direction.x() * u + direction.y() * v + direction.z() * axis_O);
     if (-beam_O.dot(target.face_normal_O) < cos_max_incidence_ - 1e-9) continue;
+    // What no tilt gives need not be clear, unless somebody wants to be told of it.
+    if (!tally && tilt_excess(kinematics, beam_O) > 1e-6) continue;
     const Obstruction beam = clearance.beam_obstruction(target.position_O, beam_O);
     if (beam != Obstruction::kNone) {
       if (tally) tally->beam(beam, clearance.beam_free_length_m(target.position_O, beam_O));
@@ -157,7 +172,8 @@ std::optional<DotPose> Reach::Implementation::find_pose(const Target& target, co
                                                         SkippedDot* skipped) const {
   auto pose = find_pose_quickly(target, reference);
   if (!pose) {
-    // Why not, is asked while looking more closely. A third look is for windows that are narrower still.
+    // Why not, is asked while looking more closely. A third look is for windows that are narrower still: what is clear
+    // says nothing of how near they are to the tilts that are possible.
     FailureTally tally;
     pose = search_cone(target, target.face_normal_O, fine_cone_, tilts_, reference, &tally);
     if (!pose && tally.is_nearly_reached())

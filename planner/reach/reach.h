@@ -37,6 +37,11 @@ struct Reach::Implementation {
   /// The first, coarse look alone: fast also where there is nothing to find, and sometimes blind there.
   std::optional<DotPose> find_pose_quickly(const Target& target, const Joints& reference) const;
 
+  /// Whether the beam meets the target within the cone around its face normal, and beam and lens pass everything.
+  bool is_clear(const Target& target, const Eigen::Vector3d& beam_O) const;
+  /// ... and some pose of table and arm brings it there.
+  bool can_hit(const Target& target, const Eigen::Vector3d& beam_O) const;
+
   /// The arm's part of it, on a table that is already chosen. Limits, quill and links are looked at, not the lens.
   bool arm_fits(const TablePose& table, const Eigen::Vector3d& position_O, double yaw, Elbow elbow,
                 const Joints& reference, Joints& joints, class FailureTally* tally) const;

@@ -129,16 +129,15 @@ void FailureTally::limit(const LimitExcess& excess) {
 bool FailureTally::is_nearly_reached() const {
   // The second look's steps are 5 degrees of direction and 7.5 of tilt: half of that turns the object, within .2 m of
   // the axis, by less than this.
-  constexpr double kLengthM = .02, kAngle = 12 * kDegree, kTiltAngle = 5 * kDegree;
+  constexpr double kLengthM = .02, kAngle = 12 * kDegree;
   // A window that is missed is narrow; a beam that is blocked near the dot is nowhere near one.
   constexpr double kDeepM = .01;
   switch (stage_) {
     case kNone:
+    case kTable:
       return true;
     case kBeam:
       return what_ == Obstruction::kBeamTable || amount_ >= kDeepM;
-    case kTable:
-      return amount_ <= kTiltAngle;
     case kLimit:
       return amount_ <= (axis_ == kJ3 || axis_ == kAxisCount ? kLengthM : kAngle);
     case kLens:

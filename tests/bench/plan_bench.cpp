@@ -1,7 +1,12 @@
 // Painting time, incidence and planning cost of the baselines and of every way of planning, on the same dots' counts,
 // by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program passes the same check.
-//   plan_bench MODEL SIZE_MM DOTS [ROW...]      rows: laminar space curve thesis fast balanced quality; all unless
-//   named plan_bench --trade MODEL SIZE_MM DOTS       painting time over incidence, by preferred incidence and planning
+//   plan_bench [--confirm N] MODEL SIZE_MM DOTS [ROW...]
+//       rows: laminar space curve thesis fast balanced quality; all unless named. Of the skipped dots of each row, N
+//       are looked for by brute force over a grid of poses one degree apart.
+//   plan_bench --trade MODEL SIZE_MM DOTS
+//       painting time over incidence, by preferred incidence and planning
+// Floor: the seconds that no order and no poses can beat, because each exposure takes the shortest settling, its pulse
+// and a move of one control tick. The shares of steps that take one, two, more ticks say what is above it.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -9,6 +14,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -16,7 +22,9 @@
 #include "config/cell_file.h"
 #include "config/job_settings.h"
 #include "planner/plan.h"
+#include "planner/poses/posed_dots.h"
 #include "planner/program_check.h"
+#include "planner/time_model.h"
 #include "sampling/images/image_file.h"
 #include "sampling/laminar.h"
 #include "sampling/mesh_repair.h"
@@ -25,6 +33,7 @@
 #include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
 #include "tests/bench/process_usage.h"
+#include "tests/planner/reach/pose_grid.h"
 
 namespace {
 
@@ -110,7 +119,9 @@ struct Bench {
     return placed;
   }
   void run(const Row& row, std::uint64_t count) const;
+  void explain_skipped(const Plan& plan, const DotSequence& dots, const Reach& reach) const;
 
+  std::size_t confirmed_by_brute_force = 0;  ///< so many of the skipped dots
   CellDescription cell;
   TexturedMesh mesh;
   SurfaceCurve curve;
@@ -133,6 +144,48 @@ Incidence incidence_of(const ExposureProgram& program) {
           static_cast<double>(all[(all.size() - 1) * 95 / 100]) / kDegree, static_cast<double>(all.back()) / kDegree};
 }
 
+struct Steps {
+  std::array<std::size_t, 3> by_ticks{};  ///< one, two, more
+  std::size_t table_moves = 0;
+
+  double percent(std::size_t ticks) const {
+    return 100. * static_cast<double>(by_ticks[ticks]) /
+           static_cast<double>(std::max<std::size_t>(1, by_ticks[0] + by_ticks[1] + by_ticks[2]));
+  }
+};
+
+Steps steps_of(const CellDescription& cell, const ExposureProgram& program) {
+  Steps steps;
+  for (std::size_t i = 1; i < program.exposures.size(); ++i) {
+    const Joints &from = program.exposures[i - 1].joints, &to = program.exposures[i].joints;
+    if (from[kTilt] != to[kTilt] || from[kRotation] != to[kRotation]) ++steps.table_moves;
+    const auto ticks = static_cast<std::size_t>(std::lround(move_s(cell, from, to) / cell.timing.tick_s));
+    ++steps.by_ticks[std::clamp<std::size_t>(ticks, 1, 3) - 1];
+  }
+  return steps;
+}
+
+/// Reasons, and whether a fine grid of poses agrees that there is none.
+void Bench::explain_skipped(const Plan& plan, const DotSequence& dots, const Reach& reach) const {
+  std::map<std::string, std::size_t> reasons;
+  std::vector<std::uint32_t> out_of_reach;
+  for (const SkippedDot& skipped : plan.skipped) {
+    ++reasons[std::string(skipped.what)];
+    if (skipped.reason != SkipReason::kEnergy && skipped.reason != SkipReason::kNoWay)
+      out_of_reach.push_back(skipped.dot_index);
+  }
+  for (const auto& [what, times] : reasons) std::printf("  skipped: %zu, %s\n", times, what.c_str());
+  const std::size_t looks = std::min(confirmed_by_brute_force, out_of_reach.size());
+  std::size_t confirmed = 0;
+  for (std::size_t k = 0; k < looks; ++k) {
+    const std::uint32_t dot = out_of_reach[k * out_of_reach.size() / looks];
+    const PoseGridAnswer answer = search_pose_grid(reach.implementation(), target_of(dots.dots[dot]), kDegree);
+    confirmed += !answer.is_reached;
+    if (answer.is_reached) std::printf("  dot %u can be reached after all\n", dot);
+  }
+  if (looks > 0) std::printf("  brute force: %zu of %zu skipped dots confirmed\n", confirmed, looks);
+}
+
 void Bench::run(const Row& row, std::uint64_t count) const {
   const DotSequence dot_sequence = dots(row, count);
   const Reach reach(mesh, cell, row.options);
@@ -143,31 +196,28 @@ void Bench::run(const Row& row, std::uint64_t count) const {
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const auto faults = check_program(plan.program, plan.skipped, dot_sequence, mesh, cell, row.options);
   AnswerHash hash;
-  std::size_t table_moves = 0;
-  for (std::size_t i = 0; i < plan.program.exposures.size(); ++i) {
-    const Joints& joints = plan.program.exposures[i].joints;
-    for (const double joint : joints) hash.take(joint);
-    if (i == 0) continue;
-    const Joints& before = plan.program.exposures[i - 1].joints;
-    if (joints[kTilt] != before[kTilt] || joints[kRotation] != before[kRotation]) ++table_moves;
-  }
+  for (const Exposure& exposure : plan.program.exposures)
+    for (const double joint : exposure.joints) hash.take(joint);
+  const Steps steps = steps_of(cell, plan.program);
   const Incidence incidence = incidence_of(plan.program);
   std::printf(
-      "%-9s %8zu %7zu %9.0f %6.2f | %6.0f %6.0f %6.0f %6.0f | %5.1f %5.1f %5.1f | %6zu %6zu | %7.2f %7.2f %6.0f %4zu "
-      "%016llx\n",
-      row.name, dot_sequence.dots.size(), plan.skipped.size(), plan.time.total_s(),
+      "%-9s %8zu %7zu %9.0f %9.0f %6.2f | %6.0f %6.0f %6.0f %6.0f | %4.0f %4.0f %4.0f | %5.1f %5.1f %5.1f | %6zu %6zu "
+      "| %7.2f %7.2f %6.0f %4zu %016llx\n",
+      row.name, dot_sequence.dots.size(), plan.skipped.size(), plan.time.total_s(), least_time_s(cell, plan.program),
       1e3 * plan.time.total_s() / static_cast<double>(std::max<std::size_t>(1, plan.program.exposures.size())),
-      plan.time.move_s, plan.time.settle_s, plan.time.expose_s, plan.time.retract_s, incidence.mean, incidence.p95,
-      incidence.max, table_moves, plan.program.vias.size(), plan_cpu_s, wall_s, peak_mb(), faults.size(), hash.value());
+      plan.time.move_s, plan.time.settle_s, plan.time.expose_s, plan.time.retract_s, steps.percent(0), steps.percent(1),
+      steps.percent(2), incidence.mean, incidence.p95, incidence.max, steps.table_moves, plan.program.vias.size(),
+      plan_cpu_s, wall_s, peak_mb(), faults.size(), hash.value());
   for (std::size_t i = 0; i < std::min<std::size_t>(faults.size(), 3); ++i)
     std::printf("  fault at %zu: %s\n", faults[i].exposure, faults[i].what.c_str());
+  explain_skipped(plan, dot_sequence, reach);
   std::fflush(stdout);
 }
 
 void print_heads() {
-  std::printf("%-9s %8s %7s %9s %6s | %6s %6s %6s %6s | %5s %5s %5s | %6s %6s | %7s %7s %6s %4s %s\n", "row", "dots",
-              "skipped", "painting", "ms/dot", "move", "settle", "expose", "retrct", "mean", "p95", "max", "table",
-              "vias", "CPU s", "wall s", "MB", "bad", "answer");
+  std::printf("%-9s %8s %7s %9s %9s %6s | %6s %6s %6s %6s | %4s %4s %4s | %5s %5s %5s | %6s %6s | %7s %7s %6s %4s %s\n",
+              "row", "dots", "skipped", "painting", "floor", "ms/dot", "move", "settle", "expose", "retrct", "1t%",
+              "2t%", "3t%", "mean", "p95", "max", "table", "vias", "CPU s", "wall s", "MB", "bad", "answer");
 }
 
 void trade(const Bench& bench, std::uint64_t count) {
@@ -186,12 +236,18 @@ int main(int argc, char** argv) {
   std::vector<std::string> arguments(argv + 1, argv + argc);
   const bool is_trade = !arguments.empty() && arguments[0] == "--trade";
   if (is_trade) arguments.erase(arguments.begin());
+  std::size_t confirmed = 0;
+  if (arguments.size() > 1 && arguments[0] == "--confirm") {
+    confirmed = static_cast<std::size_t>(std::atoll(arguments[1].c_str()));
+    arguments.erase(arguments.begin(), arguments.begin() + 2);
+  }
   if (arguments.size() < 3) {
-    std::fprintf(stderr, "usage: plan_bench [--trade] MODEL SIZE_MM DOTS [ROW...]\n");
+    std::fprintf(stderr, "usage: plan_bench [--trade | --confirm N] MODEL SIZE_MM DOTS [ROW...]\n");
     return 2;
   }
   try {
-    const Bench bench(arguments[0], std::stod(arguments[1]));
+    Bench bench(arguments[0], std::stod(arguments[1]));
+    bench.confirmed_by_brute_force = confirmed;
     const std::uint64_t count = std::stoull(arguments[2]);
     const std::vector<std::string> wanted(arguments.begin() + 3, arguments.end());
     print_heads();

@@ -62,6 +62,28 @@ TEST(Kinematics, InverseOfForwardIsTheSamePose) {
   RecordProperty("worst_rad", std::to_string(worst_rad));
 }
 
+TEST(Kinematics, RatesOverYawAreThoseOfTheInverse) {
+  const CellDescription cell = default_cell();
+  const Kinematics kinematics(cell);
+  constexpr unsigned kSeed = 13;
+  std::mt19937 random(kSeed);
+  for (int n = 0; n < 1000; ++n) {
+    const Joints joints = random_joints(cell, random);
+    if (std::abs(std::sin(joints[kJ2])) < .1) continue;
+    const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
+    const Eigen::Vector3d focus_W = table.to_W(kinematics.tool_pose(joints).focus_O);
+    const Elbow elbow = joints[kJ2] > 0 ? Elbow::kPositive : Elbow::kNegative;
+    constexpr double kStep = 1e-6;
+    Joints before = joints, after = joints;
+    ASSERT_TRUE(kinematics.solve_arm(focus_W, kinematics.yaw(joints) - kStep, elbow, before));
+    ASSERT_TRUE(kinematics.solve_arm(focus_W, kinematics.yaw(joints) + kStep, elbow, after));
+    const Joints rates = kinematics.per_yaw(joints);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      EXPECT_NEAR(rates[axis], std::remainder(after[axis] - before[axis], 2 * kPi) / (2 * kStep), 1e-4)
+          << kAxisNames[axis] << ", pose " << n << ", seed " << kSeed;
+  }
+}
+
 TEST(Kinematics, InverseOfTheWholeChainIsTheSameBeamOnTheSameDot) {
   // Only dot, beam and tilt are given: rotation, yaw and the arm are solved for, two ways and with both elbows.
   const CellDescription cell = default_cell();

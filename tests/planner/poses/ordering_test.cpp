@@ -7,7 +7,6 @@
 #include <numbers>
 #include <random>
 
-#include "planner/time_model.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
@@ -49,32 +48,6 @@ void expect_permutation(std::vector<std::uint32_t> order, std::size_t count) {
   ASSERT_EQ(order.size(), count);
   std::sort(order.begin(), order.end());
   EXPECT_EQ(order, as_it_is(count));
-}
-
-TEST(StepCost, IsTheTimeModel) {
-  const CellDescription cell = default_cell();
-  const StepCost cost(cell);
-  constexpr unsigned kSeed = 3;
-  std::mt19937 random(kSeed);
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  int rounded_apart = 0;
-  constexpr int kMoves = 20'000;
-  for (int n = 0; n < kMoves; ++n) {
-    const double scale = std::pow(10., 2 * uniform(random) - 2);
-    Joints from = home_of(cell), to = from;
-    ArmJoints from_arm, to_arm;
-    for (std::size_t i = 0; i < 4; ++i) {
-      to[i] += scale * uniform(random) * (i == kJ3 ? .1 : 1);
-      from_arm[i] = static_cast<float>(from[i]);
-      to_arm[i] = static_cast<float>(to[i]);
-    }
-    const double expected_s = move_s(cell, from, to) + settle_s(cell, from, to) - cell.timing.settle_min_s;
-    const double off_s = std::abs(static_cast<double>(cost(from_arm, to_arm)) - expected_s);
-    // Single precision may round to the tick next to it, not often.
-    if (off_s > 1e-5) ++rounded_apart;
-    EXPECT_LT(off_s, cell.timing.tick_s + 1e-5) << "seed " << kSeed << ", move " << n;
-  }
-  EXPECT_LT(rounded_apart, kMoves / 500);
 }
 
 TEST(Ordering, VisitsEveryDotOnceAndTakesLessTime) {
