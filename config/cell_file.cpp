@@ -159,6 +159,16 @@ void read_timing(JsonObject& json, CellDescription::Timing& timing) {
   if (timing.settle_min_s > timing.settle_max_s) json.refuse("settle_max_ms", "below settle_min_ms");
 }
 
+/// What jobs report in `timing.measured`.
+void read_measured(JsonObject& json, CellDescription& cell) {
+  if (json.has("move_delay_ms")) cell.timing.move_delay_s = json.quantity("move_delay_ms", {0, 10000});
+  if (!json.has("time_factor")) return;
+  json.object("time_factor", [&](JsonObject& factors) {
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      cell.axes[i].time_factor = factors.optional_number(kAxisNames[i], {.2, 10}).value_or(1);
+  });
+}
+
 CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOptions& device_options) {
   CellDescription cell;
   cell.name = json.text("name", 100);
@@ -178,6 +188,7 @@ CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOp
   json.object("laser", [&](JsonObject& laser) { read_laser(laser, cell.laser); });
   json.object("paint", [&](JsonObject& paint) { read_paint(paint, cell.paint); });
   json.object("timing", [&](JsonObject& timing) { read_timing(timing, cell.timing); });
+  if (json.has("measured")) json.object("measured", [&](JsonObject& measured) { read_measured(measured, cell); });
   json.object("devices", [&](JsonObject& devices) { device_options = read_cell_devices(devices, cell, folder); });
   json.object("simulation", [&](JsonObject& simulation) {
     cell.simulation.time_scale = simulation.number("time_scale", {0, 1000});

@@ -76,6 +76,7 @@ class Run {
   void expose_all(const std::vector<Joints>& approach, const ExecutionProgress& progress);
   std::size_t exposed() const { return exposed_; }
   const DurationHistogram& own_time() const { return own_time_; }
+  const MotionTimes& motion() const { return motion_; }
 
  private:
   enum class Rest { kPassing, kSettled };
@@ -126,6 +127,7 @@ class Run {
   std::size_t next_via_ = 0;
   std::size_t exposed_ = 0;
   DurationHistogram own_time_;
+  MotionTimes motion_;
   double idle_since_s_ = 0;  ///< the devices have nothing to do since then: our time
   double own_s_ = 0;         ///< of it, for the exposure under way
 };
@@ -237,12 +239,15 @@ void Run::move(const Leg& leg, Rest rest) {
   robot_target_ = robot_part(leg.way.back());
   table_target_ = table_part(leg.way.back());
   count_own_time();
+  const double ordered_s = cell_.clock.now_s();
   if (leg.moves_robot) send(cell_.robot, leg, settle);
   if (leg.moves_table) send(cell_.table, leg, settle);
   const double sent_s = cell_.clock.now_s();
-  at_ = leg.way.back();
+  const Joints from = std::exchange(at_, leg.way.back());
   if (rest == Rest::kSettled) prepare_exposure();
   wait_in_position(sent_s + 2 * leg.travel_s + settle + grace_s(cell_.clock, kGraceS));
+  if (rest == Rest::kSettled && leg.way.size() == 1)
+    motion_.add(description_, from, at_, idle_since_s_ - ordered_s - settle);
   rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + leg.settle_s;
 }
 
@@ -479,6 +484,7 @@ ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints
   });
   result.exposed = run.exposed();
   result.own_time = run.own_time();
+  result.motion = run.motion();
   return result;
 }
 

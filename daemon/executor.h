@@ -7,6 +7,7 @@
 
 #include "daemon/duration_histogram.h"
 #include "daemon/journal.h"
+#include "daemon/motion_times.h"
 #include "drivers/cell.h"
 #include "planner/exposure_program.h"
 
@@ -36,6 +37,8 @@ struct ExecutionResult {
   /// that fires, and from when the pulse is seen over to the call that moves. Devices that say since when are taken at
   /// their word.
   DurationHistogram own_time{};
+  /// What the devices took for the moves to exposures.
+  MotionTimes motion{};
 };
 
 using ExecutionProgress = std::function<void(std::size_t exposures_done)>;

@@ -214,6 +214,7 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   report.incidence = incidence_figures(work.plan.program);
   report.motion = motion_figures(work.plan.program);
   report.time = work.plan.time;
+  report.least_time_s = least_time_s(piece.cell, work.plan.program);
 
   write_program(work.plan.program, output / "program.ply");
   save_dots(work, output / "dots.ply");
@@ -348,6 +349,7 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
   piece.report.incidence = incidence_figures(work.plan.program);
   piece.report.motion = motion_figures(work.plan.program);
   piece.report.time = estimate_time(piece.cell, work.plan.program);
+  piece.report.least_time_s = least_time_s(piece.cell, work.plan.program);
   piece.report.files = {"report.json"};
   const Reach reach(piece.mesh, piece.cell, plan_options(piece.settings));
   develop_and_judge(piece, reach, work, emissions, request.output, stages);

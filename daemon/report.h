@@ -61,6 +61,7 @@ struct Report {
   IncidenceFigures incidence;
   MotionFigures motion;
   TimeSplit time;
+  double least_time_s = 0;  ///< see plan.h
   PictureReport picture;
   std::optional<Fidelity> fidelity;
   std::optional<HitFigures> hits;

@@ -28,6 +28,7 @@ struct AxisDescription {
   double acceleration_max = 0;   ///< rad/s2 or m/s2
   double settle_saturation = 0;  ///< the move at which settling takes longest, rad or m
   double home = 0;               ///< where homing ends
+  double time_factor = 1;        ///< what its moves were measured to take, over what speed and acceleration promise
 };
 
 /// How paint answers to x = dose / full dose; coverage in 0..1.
@@ -100,6 +101,7 @@ struct CellDescription {
            settle_max_s = 0;  ///< settle = min + (max - min) * min(1, largest move / settle_saturation)
     double retract_s = 0;     ///< backing off and coming back around a re-pose
     double message_s = 0;     ///< what one exchange with the devices costs
+    double move_delay_s = 0;  ///< what each move was measured to take longer
   } timing;
   struct Devices {  ///< driver names
     std::string robot, table, laser;

@@ -14,8 +14,9 @@ double trapezoid_s(double distance, double speed_max, double acceleration_max) {
 double move_s(const CellDescription& cell, const Joints& from, const Joints& to) {
   double slowest_s = 0;
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    slowest_s = std::max(slowest_s,
-                         trapezoid_s(std::abs(to[i] - from[i]), cell.axes[i].speed_max, cell.axes[i].acceleration_max));
+    slowest_s =
+        std::max(slowest_s, cell.axes[i].time_factor * trapezoid_s(std::abs(to[i] - from[i]), cell.axes[i].speed_max,
+                                                                   cell.axes[i].acceleration_max));
   const double tick_s = cell.timing.tick_s;
   if (tick_s <= 0) return slowest_s;
   // A move that ends on a tick by the numbers must not cost another one by their rounding.

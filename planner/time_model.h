@@ -7,7 +7,7 @@ namespace hilbrush {
 
 /// Rest to rest over `distance` (>= 0) with a trapezoidal speed profile.
 double trapezoid_s(double distance, double speed_max, double acceleration_max);
-/// Slowest axis, rounded up to whole control ticks.
+/// Slowest axis by what was measured of it, rounded up to whole control ticks.
 double move_s(const CellDescription& cell, const Joints& from, const Joints& to);
 double settle_s(const CellDescription& cell, const Joints& from, const Joints& to);
 

@@ -274,7 +274,11 @@ std::string format_job(const Json& job) {
   if (const double copies = number_field(job, "copies"); copies > 1)
     text += line("copies", format_count(number_field(job, "copies_done")) + " of " + format_count(copies) + " painted");
   if (member(job, "needs_part_in_place") == true) text += line("part", "must be confirmed to be in its place");
-  if (const Json& timing = member(job, "timing"); timing.is_object()) text += line("own time", own_time_text(timing));
+  if (const Json& timing = member(job, "timing"); timing.is_object()) {
+    text += line("own time", own_time_text(timing));
+    if (const Json& measured = member(timing, "measured"); measured.is_object())
+      text += line("measured", measured.dump());
+  }
   if (const std::string error = format_job_error(job); !error.empty()) text += line("error", error);
   if (const Json& settings = member(job, "settings"); settings.is_object())
     text += line("settings", settings_text(settings));

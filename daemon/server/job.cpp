@@ -77,6 +77,7 @@ std::string job_to_record(const Job& job) {
             {"own_dots", job.own_time.dots},
             {"own_median_s", job.own_time.median_s},
             {"own_p99_s", job.own_time.p99_s},
+            {"measured", job.measured},
             {"error_at", job.error ? Json(job.error->at) : Json(nullptr)},
             {"error_message", job.error ? Json(job.error->message) : Json(nullptr)},
             {"warnings", job.warnings}};
@@ -128,6 +129,7 @@ std::optional<Job> job_from_record(const std::string& text) {
   take("own_dots", job.own_time.dots);
   take("own_median_s", job.own_time.median_s);
   take("own_p99_s", job.own_time.p99_s);
+  take("measured", job.measured);
   JobError error;
   take("error_at", error.at);
   if (take("error_message", error.message)) job.error = error;
@@ -141,9 +143,13 @@ Json text_or_null(const std::string& text) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
-Json own_time_json(const Job::OwnTime& own) {
+Json timing_json(const Job& job) {
+  const Job::OwnTime& own = job.own_time;
   if (own.dots == 0) return nullptr;
-  return {{"dots", own.dots}, {"own_ms", {{"median", own.median_s * 1e3}, {"p99", own.p99_s * 1e3}}}};
+  Json timing{{"dots", own.dots}, {"own_ms", {{"median", own.median_s * 1e3}, {"p99", own.p99_s * 1e3}}}};
+  const Json measured = Json::parse(job.measured, nullptr, false);
+  timing["measured"] = measured.is_object() ? measured : Json(nullptr);
+  return timing;
 }
 
 }  // namespace
@@ -180,7 +186,7 @@ Json job_to_json(const Job& job) {
   json["position"] = job.position > 0 ? Json(job.position) : Json(nullptr);
   const bool can_paint = !job.dry_run && (job.state == JobState::kReady || job.state == JobState::kPaused);
   json["needs_part_in_place"] = can_paint && !job.is_part_confirmed;
-  json["timing"] = own_time_json(job.own_time);
+  json["timing"] = timing_json(job);
   return json;
 }
 

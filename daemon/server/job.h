@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/duration_histogram.h"
+#include "daemon/motion_times.h"
 
 /// A job as the daemon remembers and tells it. Plain data; the socket thread owns it.
 namespace hilbrush {
@@ -66,6 +67,9 @@ struct Job {
     double median_s = 0, p99_s = 0;
   } own_time;
   DurationHistogram own_times;
+  /// What moves were measured to take, as a cell file's `measured`: a JSON object as text, or empty.
+  std::string measured;
+  MotionTimes motion_times;
 
   /// Not kept: somebody has seen the part in its place and nothing has happened since that could have moved it.
   bool is_part_confirmed = false;

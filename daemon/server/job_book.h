@@ -112,6 +112,7 @@ class JobBook {
   void note_progress(std::size_t exposed);
   void finish_run(const ExecutionResult& result, const PaintTally& tally);
   void note_own_time(Job& job, const DurationHistogram& own_time);
+  void note_motion(Job& job, const MotionTimes& motion);
   void finish_copy(Job& job);
   void take_tally(Job& job, const PaintTally& tally);
   void handle_stop();

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "daemon/server/job_book.h"
 
@@ -143,6 +144,24 @@ void JobBook::note_own_time(Job& job, const DurationHistogram& own_time) {
     job.own_time = {job.own_times.count(), job.own_times.quantile_s(.5) * scale, job.own_times.quantile_s(.99) * scale};
 }
 
+namespace {
+
+/// As a cell file takes it.
+std::string measured_text(const MeasuredMotion& motion) {
+  const auto rounded = [](double value) { return std::round(1e4 * value) / 1e4; };
+  Json factors = Json::object();
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (motion.time_factor[i]) factors[kAxisNames[i]] = rounded(*motion.time_factor[i]);
+  return Json{{"move_delay_ms", rounded(1e3 * motion.move_delay_s)}, {"time_factor", factors}}.dump();
+}
+
+}  // namespace
+
+void JobBook::note_motion(Job& job, const MotionTimes& motion) {
+  job.motion_times.add(motion);
+  if (const auto measured = job.motion_times.measured()) job.measured = measured_text(*measured);
+}
+
 /// After each copy but the last the job waits for its next part.
 void JobBook::finish_copy(Job& job) {
   ++job.copies_done;
@@ -171,6 +190,7 @@ void JobBook::finish_run(const ExecutionResult& result, const PaintTally& tally)
   job.eta_s.reset();
   job.error.reset();
   note_own_time(job, result.own_time);
+  note_motion(job, result.motion);
   switch (result.outcome) {
     case ExecutionOutcome::kFinished:
       finish_copy(job);

@@ -10,7 +10,7 @@ namespace hilbrush {
 namespace {
 
 /// Step i brings a database from version i to i + 1. Steps are added, never changed.
-constexpr std::array<const char*, 2> kMigrations{R"(
+constexpr std::array<const char*, 3> kMigrations{R"(
   CREATE TABLE job (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     key TEXT UNIQUE,
@@ -39,14 +39,18 @@ constexpr std::array<const char*, 2> kMigrations{R"(
   UPDATE job SET rank = id, is_begun = (dry_run = 0 AND state IN ('painting', 'paused', 'done'));
   UPDATE job SET copies_done = 1 WHERE dry_run = 0 AND state = 'done';
   CREATE INDEX job_state ON job (state);
+)",
+                                                 // What moves took, as JSON.
+                                                 R"(
+  ALTER TABLE job ADD COLUMN measured TEXT NOT NULL DEFAULT '';
 )"};
 
 constexpr const char* kColumns =
     "key, uid, gid, state, model, model_copy, model_sha256, settings, settings_sha256, cell, dry_run, created, placed, "
     "skipped, exposed, planned_s, error_at, error_message, warnings, rank, copies, copies_done, is_begun, started, "
     "ended, "
-    "own_dots, own_median_s, own_p99_s";
-constexpr int kColumnCount = 28;
+    "own_dots, own_median_s, own_p99_s, measured";
+constexpr int kColumnCount = 29;
 
 std::string marks() {
   std::string text = "?";
@@ -117,6 +121,7 @@ void bind(SQLite::Statement& statement, const Job& job) {
   number(job.own_time.dots);
   statement.bind(++i, job.own_time.median_s);
   statement.bind(++i, job.own_time.p99_s);
+  text(job.measured);
 }
 
 Job read_job(SQLite::Statement& row) {
@@ -158,6 +163,7 @@ Job read_job(SQLite::Statement& row) {
   job.own_time.dots = number();
   job.own_time.median_s = row.getColumn(i++).getDouble();
   job.own_time.p99_s = row.getColumn(i++).getDouble();
+  job.measured = text();
   return job;
 }
 

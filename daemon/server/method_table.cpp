@@ -83,7 +83,9 @@ Json job_schema() {
       {"position", nullable("integer", "place in the queue, from 1")},
       {"needs_part_in_place", typed("boolean", "job.start or job.resume must confirm that the part is in its place")},
       {"timing",
-       nullable("object", "the time that Hilbrush itself adds to each dot: dots counted, own_ms median, p99")}};
+       nullable("object",
+                "the time that Hilbrush itself adds to each dot: dots counted, own_ms median, p99; and what the moves "
+                "took, measured, as it may stand in a cell file")}};
   return {{"type", "object"}, {"properties", std::move(properties)}};
 }
 

@@ -350,6 +350,23 @@ TEST(CellFile, TheColumnEndsUnderTheUpperArmUnlessTheFileSaysWhere) {
   EXPECT_EQ(refusal_of(json).at, "cell.json: $.arm.column_height_mm");
 }
 
+TEST(CellFile, MeasuredMotionIsOptional) {
+  Json json = Json::parse(default_text());
+  CellDescription cell = cell_from_json(json.dump(), "");
+  EXPECT_EQ(cell.timing.move_delay_s, 0);
+  EXPECT_EQ(cell.axes[kJ3].time_factor, 1);
+  json["measured"] = {{"move_delay_ms", 1.5}, {"time_factor", {{"j3", 1.25}, {"c", .9}}}};
+  cell = cell_from_json(json.dump(), "");
+  EXPECT_DOUBLE_EQ(cell.timing.move_delay_s, .0015);
+  EXPECT_EQ(cell.axes[kJ3].time_factor, 1.25);
+  EXPECT_EQ(cell.axes[kRotation].time_factor, .9);
+  EXPECT_EQ(cell.axes[kJ1].time_factor, 1);
+  json["measured"]["time_factor"]["j3"] = .1;
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.measured.time_factor.j3");
+  json["measured"] = {{"settle_ms", 1}};
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.measured.settle_ms");
+}
+
 TEST(CellFile, CellsAreFoundByNameOrPath) {
   EXPECT_EQ(find_cell("default"), shipped("default"));
   EXPECT_EQ(find_cell(shipped("default").string()), shipped("default"));

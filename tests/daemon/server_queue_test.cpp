@@ -298,6 +298,7 @@ TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
     Job job;
     job.state = i == 4 ? JobState::kReady : JobState::kDone;
     job.own_time = {7, .001, .002};
+    job.measured = R"({"move_delay_ms":1.5})";
     store.insert(job);
   }
   const auto recent = store.load_recent(5);
@@ -306,6 +307,7 @@ TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
   EXPECT_EQ(recent.back().id, 20);
   ASSERT_TRUE(store.find(1)) << "the rest is still there";
   EXPECT_EQ(store.find(1)->own_time.p99_s, .002);
+  EXPECT_EQ(store.find(1)->measured, R"({"move_delay_ms":1.5})");
 }
 
 TEST(JobRecordTest, SaysAllOfAJobAndReadsWhateverItIsGiven) {
@@ -319,6 +321,7 @@ TEST(JobRecordTest, SaysAllOfAJobAndReadsWhateverItIsGiven) {
   job.is_begun = true;
   job.error = JobError{"x:1", "no"};
   job.warnings = {"one", "two"};
+  job.measured = R"({"move_delay_ms":1.5})";
   const auto back = job_from_record(job_to_record(job));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->id, 12);
@@ -327,6 +330,7 @@ TEST(JobRecordTest, SaysAllOfAJobAndReadsWhateverItIsGiven) {
   EXPECT_TRUE(back->is_begun);
   EXPECT_EQ(back->error->message, "no");
   EXPECT_EQ(back->warnings, job.warnings);
+  EXPECT_EQ(back->measured, job.measured);
   for (const char* text : {"", "[]", "{", "{}", R"({"id":-1,"state":"done"})", R"({"id":1,"state":"asleep"})"})
     EXPECT_FALSE(job_from_record(text)) << text;
   const auto odd = job_from_record(R"({"id":1,"state":"done","copies":"many","warnings":7,"error_message":[]})");
@@ -416,6 +420,7 @@ TEST_F(ServerDevicesTest, ADeviceThatFailsInAJobPausesItAndTheJobGoesOn) {
   EXPECT_EQ(job.at("dots").at("exposed").get<int>() + job.at("dots").at("in_doubt").get<int>(), 600);
   ASSERT_TRUE(job.at("timing").is_object());
   EXPECT_GT(job.at("timing").at("own_ms").at("p99").get<double>(), 0);
+  EXPECT_GE(job.at("timing").at("measured").at("move_delay_ms").get<double>(), 0);
   for (const auto& emission : read_emission_record(world.job_folder(id) / "emissions.ply"))
     EXPECT_FALSE(emission.is_moving);
 }

@@ -1,0 +1,38 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "planner/cell_description.h"
+
+/// What moves really take beside what the time model foresees, as the least squares of
+///   measured = delay + factor of the slowest axis * the time that its speed and acceleration promise
+/// over all moves, in constant memory. Plain value, one thread.
+namespace hilbrush {
+
+/// In the form that a cell file's `measured` takes.
+struct MeasuredMotion {
+  double move_delay_s = 0;
+  std::array<std::optional<double>, kAxisCount> time_factor;  ///< of axes that were the slowest often enough
+};
+
+class MotionTimes {
+ public:
+  /// A move from rest to rest that was over `seconds` after it was ordered, the settling that was ordered not counted.
+  void add(const CellDescription& cell, const Joints& from, const Joints& to, double seconds);
+  void add(const MotionTimes& other);
+  std::uint64_t count() const;
+  /// Nothing before some hundred moves.
+  std::optional<MeasuredMotion> measured() const;
+
+ private:
+  struct Sums {
+    std::uint64_t moves = 0;
+    double promised = 0, measured = 0, promised2 = 0, product = 0;
+  };
+  double delay_s() const;
+
+  std::array<Sums, kAxisCount> axes_;  ///< by the axis that is the slowest
+};
+
+}  // namespace hilbrush
