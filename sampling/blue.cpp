@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sampling/check.h"
+#include "sampling/curve/dot_triangle.h"
 #include "sampling/curve/sequence.h"
 #include "sampling/relax/colouring.h"
 #include "sampling/relax/kernel.h"

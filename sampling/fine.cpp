@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sampling/check.h"
+#include "sampling/curve/dot_triangle.h"
 #include "sampling/input_error.h"
 #include "sampling/relax/paint_model.h"
 #include "sampling/relax/surface_place.h"

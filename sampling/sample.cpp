@@ -1,5 +1,6 @@
 #include "sampling/sample.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_group.h>
 
@@ -76,43 +77,47 @@ class PathMeter {
 /// Makes blocks in parallel, a batch at a time; while the caller has one batch the next is made.
 class BlockStream {
  public:
-  BlockStream(const DotPlan& plan)
+  explicit BlockStream(const DotPlan& plan)
       : plan_(plan),
+        makers_([&plan] { return BlockMaker(plan); }),
         block_size_(std::clamp(plan.strata.count / kBlocksAtLeast, kLeastDotsInBlock, kMostDotsInBlock)),
         block_count_((plan.strata.count + block_size_ - 1) / block_size_) {}
 
   template <class Visit>
   void run(Visit visit) {
-    std::vector<DotBlock> ready = make_batch(0), next;
+    make_batch(0, ready_);
     for (std::uint64_t begin = 0; begin < block_count_; begin += kBlocksAtOnce) {
       // Should the visitor throw, the batch under way is waited for.
       struct Waiter {
         tbb::task_group group;
         ~Waiter() { group.wait(); }
       } waiter;
-      if (begin + kBlocksAtOnce < block_count_) waiter.group.run([&] { next = make_batch(begin + kBlocksAtOnce); });
-      for (std::size_t i = 0; i < ready.size(); ++i)
-        visit(ready[i], std::min(plan_.strata.count, (begin + i + 1) * block_size_));
+      if (begin + kBlocksAtOnce < block_count_) waiter.group.run([&] { make_batch(begin + kBlocksAtOnce, next_); });
+      for (std::size_t i = 0; i < blocks_from(begin); ++i)
+        visit(ready_[i], std::min(plan_.strata.count, (begin + i + 1) * block_size_));
       waiter.group.wait();
-      ready = std::move(next);
+      std::swap(ready_, next_);
     }
   }
 
  private:
-  std::vector<DotBlock> make_batch(std::uint64_t begin) const {
-    const std::uint64_t end = std::min(begin + kBlocksAtOnce, block_count_);
-    std::vector<DotBlock> blocks(end - begin);
+  std::size_t blocks_from(std::uint64_t begin) const { return std::min(kBlocksAtOnce, block_count_ - begin); }
+
+  void make_batch(std::uint64_t begin, std::vector<DotBlock>& blocks) {
+    blocks.resize(kBlocksAtOnce);
     tbb::parallel_for(
-        begin, end,
-        [&](std::uint64_t b) {
-          blocks[b - begin] = make_block(plan_, b * block_size_, std::min((b + 1) * block_size_, plan_.strata.count));
+        std::size_t{0}, blocks_from(begin),
+        [&](std::size_t i) {
+          const std::uint64_t first = (begin + i) * block_size_;
+          makers_.local().make(first, std::min(first + block_size_, plan_.strata.count), blocks[i]);
         },
         tbb::simple_partitioner());
-    return blocks;
   }
 
   const DotPlan& plan_;
+  tbb::enumerable_thread_specific<BlockMaker> makers_;
   std::uint64_t block_size_, block_count_;
+  std::vector<DotBlock> ready_, next_;  ///< what they take is used again
 };
 
 }  // namespace

@@ -214,12 +214,30 @@ double ToneField::asked(const SurfacePoint& point) const {
                          texels.addressing);
 }
 
+/// Without a tone curve or an atlas the asked tone is the wanted one, but for what a layer cannot follow.
+bool ToneField::is_wanted_asked(std::uint32_t triangle) const {
+  switch (sources_[triangle].kind) {
+    case Source::kBlank:
+      return true;
+    case Source::kColors:
+      return !atlas_ && options_.curve.wanted.empty();
+    case Source::kTexture:
+      break;
+    case Source::kMean:
+      return false;
+  }
+  const bool is_replacing = layers_[sources_[triangle].layer].luminance_factor < 0;
+  const auto& l = mesh_.corner_luminance[triangle];
+  return !atlas_ && options_.curve.wanted.empty() && (is_replacing || (l[0] == l[1] && l[1] == l[2]));
+}
+
 TriangleTone ToneField::on(std::uint32_t triangle) const {
   TriangleTone result;
   result.field_ = this;
   result.triangle_ = triangle;
   result.space_ = 2 * mesh_.area_vector(triangle).norm();
   const Source source = sources_[triangle];
+  result.is_wanted_asked_ = is_wanted_asked(triangle);
   if (source.kind == Source::kBlank) return result;
   if (atlas_ || source.kind == Source::kTexture) {
     const AskedTexels texels = asked_texels(triangle);
@@ -229,6 +247,7 @@ TriangleTone ToneField::on(std::uint32_t triangle) const {
     result.origin_ = texels.corners[0];
     result.e1_ = texels.corners[1] - texels.corners[0];
     result.e2_ = texels.corners[2] - texels.corners[0];
+    result.per_determinant_ = 1 / cross(result.e1_, result.e2_);
   } else if (source.kind == Source::kMean) {
     result.tone_ = layers_[source.layer].tones.mean();
   } else {

@@ -84,6 +84,7 @@ class ToneField {
     std::array<Eigen::Vector2d, 3> corners;
   };
   AskedTexels asked_texels(std::uint32_t triangle) const;
+  bool is_wanted_asked(std::uint32_t triangle) const;
 
   const TexturedMesh& mesh_;
   ToneOptions options_;

@@ -56,22 +56,26 @@ inline constexpr int kMostCurveSteps = 8;
 /// Integral of the curve's place over its first `share`, in the unit square. Within each of the smallest squares (side
 /// 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the place is taken as its middle.
 template <class Curve>
-Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMostCurveSteps) {
+inline Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMostCurveSteps) {
   using Table = CurveTable<Curve>;
-  Eigen::Vector2d moment(0, 0), low(0, 0);
-  double size = 1, weight = 1;  // of the child that the walk is in: side, and share of the curve
+  // In units of the child that the walk is in: its side, and its share of the curve.
+  double moment_x = 0, moment_y = 0, low_x = 0, low_y = 0, size = 1, weight = 1;
+  share = std::clamp(share, 0., 1.);
   for (int step = 0; step < steps; ++step) {
-    const double f = Table::kCount * std::clamp(share, 0., 1.);
-    const unsigned i = std::min(static_cast<unsigned>(f), Table::kCount - 1);
-    const auto& entry = kCurveTable<Curve>.entries[curve.permutation][i];
-    weight /= Table::kCount;
-    moment += weight * (static_cast<double>(i) * low + size * Eigen::Vector2d(entry.moment_x, entry.moment_y));
-    low += size * Eigen::Vector2d(entry.x, entry.y);
-    size /= Table::kAlong;
+    const double f = Table::kCount * share;
+    const int i = std::min(static_cast<int>(f), static_cast<int>(Table::kCount) - 1);
+    const auto& entry = kCurveTable<Curve>.entries[curve.permutation][static_cast<std::size_t>(i)];
+    weight *= 1. / Table::kCount;
+    moment_x += weight * (i * low_x + size * entry.moment_x);
+    moment_y += weight * (i * low_y + size * entry.moment_y);
+    low_x += size * entry.x;
+    low_y += size * entry.y;
+    size *= 1. / Table::kAlong;
     curve = Curve(entry.permutation);
     share = f - i;
   }
-  return moment + weight * share * (low + Eigen::Vector2d::Constant(size / 2));
+  weight *= share;
+  return {moment_x + weight * (low_x + size / 2), moment_y + weight * (low_y + size / 2)};
 }
 
 /// Where the curve is after `share` of its way, in the unit square.

@@ -31,26 +31,33 @@ struct Lifted {
 };
 
 /// `likely` is the frame to begin with, and then the one that was found: neighbours on the curve lie on few faces.
-Lifted lift(const std::vector<FaceFrame>& frames, const Vector2d& place, std::uint32_t& likely) {
-  Lifted best;
-  double deepest = -std::numeric_limits<double>::infinity();
-  Vector2d best_along = Vector2d::Zero();
-  const auto count = static_cast<std::uint32_t>(frames.size());
-  std::uint32_t i = likely < count ? likely : 0;
-  for (std::uint32_t tried = 0; tried < count; ++tried, i = i + 1 == count ? 0 : i + 1) {
-    const Vector2d along = frames[i].to_face * (place - frames[i].place);
-    const double depth = std::min({along.x(), along.y(), 1 - along.x() - along.y()});
-    if (!(depth > deepest)) continue;
-    best.frame = i, deepest = depth, best_along = along;
-    if (depth >= 0) break;
+template <class Walk>
+inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likely) {
+  const std::uint32_t count = walk.frame_count();
+  std::uint32_t best = likely < count ? likely : 0;
+  const auto look_into = [&](std::uint32_t i) {
+    const FaceFrame& frame = walk.frame(i);
+    const Vector2d along = frame.to_face * (place - frame.place);
+    return std::pair(std::min(std::min(along.x(), along.y()), 1 - along.x() - along.y()), along);
+  };
+  auto [deepest, best_along] = look_into(best);
+  if (!(deepest >= 0)) {
+    // All of them, without a way out between: which one it is can't be foreseen.
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto [depth, along] = look_into(i);
+      const bool is_deeper = depth > deepest;
+      best = is_deeper ? i : best;
+      deepest = is_deeper ? depth : deepest;
+    }
+    best_along = look_into(best).second;
   }
-  likely = best.frame;
-  best.is_inside = deepest >= -kOnSide;
-  best_along = best_along.cwiseMax(0.);
-  if (best_along.sum() > 1) best_along /= best_along.sum();
-  const FaceFrame& frame = frames[best.frame];
-  best.b = frame.b + frame.face_to_b * best_along;
-  return best;
+  likely = best;
+  if (deepest < 0) {
+    best_along = best_along.cwiseMax(0.);
+    if (best_along.sum() > 1) best_along /= best_along.sum();
+  }
+  const FaceFrame& frame = walk.frame(best);
+  return {best, frame.b + frame.face_to_b * best_along, deepest >= -kOnSide};
 }
 
 /// Steps of the curve's table that are fine enough for a patch with so many dots.
@@ -85,10 +92,29 @@ class CurveStretches {
   Vector2d moment_ = Vector2d::Zero();  ///< up to last_
 };
 
-/// Puts one dot at the centre of each stratum.
-class CentreWriter {
+/// What both writers do with a place.
+class DotWriter {
  public:
-  CentreWriter(const DotPlan& plan, std::vector<Dot>& dots) : plan_(plan), dots_(dots) {}
+  DotWriter(const DotPlan& plan, DotTriangles& triangles, std::vector<Dot>& dots)
+      : plan_(plan), triangles_(triangles), dots_(dots) {}
+
+ protected:
+  void put_at(const SurfacePoint& point, std::uint32_t sheet) {
+    dots_.push_back(triangles_[point.triangle].dot_at(point.barycentric, plan_.mass.curve.sheets[sheet].component));
+  }
+
+  const DotPlan& plan_;
+  DotTriangles& triangles_;
+  std::uint32_t likely_frame_ = 0;  ///< to lift() from
+
+ private:
+  std::vector<Dot>& dots_;
+};
+
+/// Puts one dot at the centre of each stratum.
+class CentreWriter : public DotWriter {
+ public:
+  using DotWriter::DotWriter;
 
   /// Whole base quads, `first` to `last` - 1.
   void add_quads(std::size_t first, std::size_t last) {
@@ -143,16 +169,38 @@ class CentreWriter {
     add_pieces(walk, node, from, to);
   }
 
+  /// A stratum that lies in one patch as a whole: all there is to say of an even one is where its middle is.
+  template <class Curve>
+  void add_stratum(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
+                   double to, std::uint64_t index) {
+    if constexpr (QuadWalk<Curve>::kDimensions == 2)
+      if (kind == PatchKind::kEven && to > from) {
+        const Lifted lifted = lift(walk, mean_place(node, from, to), likely_frame_);
+        const SurfacePoint middle = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
+        last_quad_ = walk.quad();
+        if (is_surely_painted(triangles_[middle.triangle].asked(middle.barycentric)))
+          return put_at(middle, walk.sheet());
+      }
+    add(walk, node, kind, from, to);
+    close(index);
+  }
+
   void close(std::uint64_t) {
     // Rounding may leave nothing to a stratum at the very end of the curve.
     if (stratum_.is_empty()) add_quads(last_quad_, last_quad_ + 1);
     const StratumPart& part = stratum_.heaviest();
-    dots_.push_back(make_dot(plan_.mass.curve, plan_.mass.tone, centre_on_surface(plan_.mass, part),
-                             plan_.mass.curve.sheets[part.sheet].component));
+    put_at(centre_on_surface(plan_.mass, triangles_, part), part.sheet);
     stratum_.clear();
   }
 
  private:
+  /// Of a stretch of an even patch, on the square.
+  template <class Node>
+  Vector2d mean_place(const Node& node, double from, double to) {
+    const int steps = curve_steps(node.mass / plan_.rule.dot_mass);
+    return node.low + node.size * stretches_.mean_place(node.curve, from, to, steps);
+  }
+
   StratumPart& begin_part(std::uint32_t sheet) {
     StratumPart& part = stratum_.on(sheet);
     is_new_ = !(part.mass > 0);
@@ -171,10 +219,8 @@ class CentreWriter {
   template <class Curve>
   void add_even(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
     const double mass = (to - from) * node.mass;
-    const int steps = curve_steps(node.mass / plan_.rule.dot_mass);
-    const Vector2d place = node.low + node.size * stretches_.mean_place(node.curve, from, to, steps);
-    const Lifted lifted = lift(walk.frames(), place, likely_frame_);
-    const FaceFrame& frame = walk.frames()[lifted.frame];
+    const Lifted lifted = lift(walk, mean_place(node, from, to), likely_frame_);
+    const FaceFrame& frame = walk.frame(lifted.frame);
     StratumPart& part = begin_part(walk.sheet());
     part.moment_O += mass * frame.at(lifted.b);
     add_in_triangle(part, frame.triangle, mass * lifted.b);
@@ -193,7 +239,7 @@ class CentreWriter {
     const auto& heaviest = walk.heaviest(node);
     for (const auto index : node.pieces) {
       const auto& held = walk.held(index);
-      const FaceFrame& frame = walk.frames()[held.frame];
+      const FaceFrame& frame = walk.frame(held.frame);
       const double scale = share * node.scale, mass = scale * held.integral.mass;
       const Vector2d moment_b = scale * held.integral.first;
       part.moment_O += mass * frame.origin_O + moment_b.x() * frame.e1_O + moment_b.y() * frame.e2_O;
@@ -207,7 +253,7 @@ class CentreWriter {
     if (mass <= part.heaviest_mass) return;
     part.heaviest_mass = mass;
     part.heaviest =
-        surface_point(walk.frames()[heaviest.frame].triangle, heaviest.integral.first / heaviest.integral.mass);
+        surface_point(walk.frame(heaviest.frame).triangle, heaviest.integral.first / heaviest.integral.mass);
     part.polygon_size = heaviest.piece.corner_count;
     for (std::size_t i = 0; i < part.polygon_size; ++i) part.polygon[i] = heaviest.piece.corners[i].b;
     part.heaviest_quad = StratumPart::kNoQuad;
@@ -217,10 +263,10 @@ class CentreWriter {
   template <class Curve>
   void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
                      double from, double to) {
-    const Lifted middle = lift(walk.frames(), node.low + Vector2d::Constant(.5 * node.size), likely_frame_);
+    const Lifted middle = lift(walk, node.low + Vector2d::Constant(.5 * node.size), likely_frame_);
     const Vector2d place = node.low + node.size * stretches_.mean_place(node.curve, from, to, 1);
-    const Lifted there = lift(walk.frames(), place, likely_frame_);
-    const FaceFrame &at_middle = walk.frames()[middle.frame], &at_there = walk.frames()[there.frame];
+    const Lifted there = lift(walk, place, likely_frame_);
+    const FaceFrame &at_middle = walk.frame(middle.frame), &at_there = walk.frame(there.frame);
     const double mass = (to - from) * node.mass;
     part.moment_O += mass * (at_there.at(there.b) - at_middle.at(middle.b));
     if (at_middle.triangle == part.triangle && at_there.triangle == part.triangle)
@@ -229,19 +275,16 @@ class CentreWriter {
       part.triangle = kNoTriangle;
   }
 
-  const DotPlan& plan_;
-  std::vector<Dot>& dots_;
   Stratum stratum_;
   CurveStretches stretches_;
-  std::uint32_t likely_frame_ = 0;
   bool is_new_ = true;  ///< nothing was added to the part before this patch
   std::size_t last_quad_ = 0;
 };
 
 /// Puts a dot where a number of the sequence falls.
-class PlaceWriter {
+class PlaceWriter : public DotWriter {
  public:
-  PlaceWriter(const DotPlan& plan, std::vector<Dot>& dots) : plan_(plan), dots_(dots) {}
+  using DotWriter::DotWriter;
 
   template <class Curve>
   void put(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind, double share,
@@ -252,10 +295,6 @@ class PlaceWriter {
   void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads[quad].sheet); }
 
  private:
-  void put_at(const SurfacePoint& point, std::uint32_t sheet) {
-    dots_.push_back(make_dot(plan_.mass.curve, plan_.mass.tone, point, plan_.mass.curve.sheets[sheet].component));
-  }
-
   /// Within a patch the mass is taken as even on what is painted of it: where the curve is on blank surface, or beside
   /// the surface, other places of the patch have their turn.
   template <class Curve>
@@ -265,24 +304,20 @@ class PlaceWriter {
       for (int i = 0; i < kMostTries; ++i) {
         const double at = share + std::fmod(i * std::numbers::phi, 1.) / dots;
         const Vector2d place = node.low + node.size * curve_place(node.curve, at - std::floor(at));
-        const Lifted lifted = lift(walk.frames(), place, likely_frame_);
-        const SurfacePoint point = surface_point(walk.frames()[lifted.frame].triangle, lifted.b);
-        if (lifted.is_inside && plan_.mass.tone.asked(point) > 0) return point;
+        const Lifted lifted = lift(walk, place, likely_frame_);
+        const SurfacePoint point = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
+        if (lifted.is_inside && triangles_[point.triangle].asked(point.barycentric) > 0) return point;
       }
     }
     if (node.pieces.empty()) return heaviest_point(plan_.mass, walk.quad());
     const auto& heaviest = walk.heaviest(node);
-    const std::uint32_t triangle = walk.frames()[heaviest.frame].triangle;
+    const std::uint32_t triangle = walk.frame(heaviest.frame).triangle;
     const SurfacePoint centre = surface_point(triangle, heaviest.integral.first / heaviest.integral.mass);
-    if (plan_.mass.tone.asked(centre) > 0) return centre;
+    if (triangles_[triangle].asked(centre.barycentric) > 0) return centre;
     std::vector<Vector2d> polygon;
     for (const auto& corner : heaviest.piece.all()) polygon.push_back(corner.b);
     return point_with_tone(plan_.mass.tone, triangle, polygon);
   }
-
-  const DotPlan& plan_;
-  std::vector<Dot>& dots_;
-  std::uint32_t likely_frame_ = 0;
 };
 
 }  // namespace
@@ -295,18 +330,20 @@ DotPlan::DotPlan(const CurveMass::Implementation& m, const SampleOptions& option
     sequence.emplace(options.sampler, count, options.seed);
 }
 
-DotBlock make_block(const DotPlan& plan, std::uint64_t first, std::uint64_t last) {
-  DotBlock block;
+BlockMaker::BlockMaker(const DotPlan& plan) : plan_(plan), walks_(plan), triangles_(plan.mass.curve, plan.mass.tone) {}
+
+void BlockMaker::make(std::uint64_t first, std::uint64_t last, DotBlock& block) {
+  block.dots.clear();
   block.dots.reserve(last - first);
-  if (plan.sequence) {
-    PlaceWriter writer(plan, block.dots);
-    find_places(plan, first, last, writer, block.patches_at_depth);
+  block.patches_at_depth.clear();
+  if (plan_.sequence) {
+    PlaceWriter writer(plan_, triangles_, block.dots);
+    find_places(plan_, walks_, first, last, writer, block.patches_at_depth);
   } else {
-    CentreWriter writer(plan, block.dots);
-    cut_strata(plan, first, last, writer, block.patches_at_depth);
+    CentreWriter writer(plan_, triangles_, block.dots);
+    cut_strata(plan_, walks_, first, last, writer, block.patches_at_depth);
   }
   CHECK_EQ(block.dots.size(), last - first);
-  return block;
 }
 
 }  // namespace hilbrush

@@ -41,7 +41,7 @@ Patch patch_of(const CurveMass::Implementation& mass, const QuadWalk<Curve>& wal
   Patch patch{walk.sheet(), node.depth, kind, node.at, node.mass, {}};
   for (const auto index : node.pieces) {
     const auto& held = walk.held(index);
-    PatchPiece piece{walk.frames()[held.frame].triangle, {}, held.integral};
+    PatchPiece piece{walk.frame(held.frame).triangle, {}, held.integral};
     piece.integral.mass *= node.scale;
     piece.integral.first *= node.scale;
     for (const auto& corner : held.piece.all()) piece.corners_b.push_back(corner.b);
@@ -77,6 +77,12 @@ struct Stretches {
     if (to > from) visit(stratum, patch_of(mass, walk, node, kind), from, to);
   }
   void close(std::uint64_t index) { stratum = index + 1; }
+  template <class Curve>
+  void add_stratum(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
+                   double to, std::uint64_t index) {
+    add(walk, node, kind, from, to);
+    close(index);
+  }
 };
 
 }  // namespace
@@ -95,7 +101,8 @@ void visit_stretches(const CurveMass& curve_mass, const SampleOptions& options,
   const DotPlan plan(mass, options, count_dots(curve_mass, options));
   Stretches stretches{mass, visit};
   std::vector<std::size_t> patches_at_depth;
-  cut_strata(plan, 0, plan.strata.count, stretches, patches_at_depth);
+  Walks walks(plan);
+  cut_strata(plan, walks, 0, plan.strata.count, stretches, patches_at_depth);
 }
 
 }  // namespace hilbrush

@@ -55,12 +55,11 @@ struct Piece {
   }
 };
 
-/// Cuts a piece by the plane place[axis] = at. What lies on the plane belongs to the upper part. Both parts get the
-/// very same new corners, so that no area is lost or counted twice, however badly the places are rounded.
-template <int kDimensions>
-void cut_piece(const Piece<kDimensions>& piece, int axis, double at, Piece<kDimensions>& lower,
-               Piece<kDimensions>& upper) {
-  lower.corner_count = upper.corner_count = 0;
+/// Cuts a piece by the plane place[axis] = at, and hands the corners of its parts on, in order. What lies on the plane
+/// belongs to the upper part. Both parts get the very same new corners, so that no area is lost or counted twice,
+/// however badly the places are rounded.
+template <int kDimensions, class AddLower, class AddUpper>
+void cut_corners(const Piece<kDimensions>& piece, int axis, double at, AddLower add_lower, AddUpper add_upper) {
   if (piece.corner_count == 0) return;
   const auto* p = &piece.corners[piece.corner_count - 1];
   double dp = p->place[axis] - at;
@@ -71,12 +70,39 @@ void cut_piece(const Piece<kDimensions>& piece, int axis, double at, Piece<kDime
       const double f = dp / (dp - dq);
       PieceCorner<kDimensions> crossing{p->place + f * (q->place - p->place), p->b + f * (q->b - p->b)};
       crossing.place[axis] = at;
-      lower.add(crossing);
-      upper.add(crossing);
+      add_lower(crossing);
+      add_upper(crossing);
     }
-    (dq < 0 ? lower : upper).add(*q);
+    if (dq < 0)
+      add_lower(*q);
+    else
+      add_upper(*q);
     p = q, dp = dq;
   }
+}
+
+template <int kDimensions>
+void cut_piece(const Piece<kDimensions>& piece, int axis, double at, Piece<kDimensions>& lower,
+               Piece<kDimensions>& upper) {
+  using Corner = PieceCorner<kDimensions>;
+  lower.corner_count = upper.corner_count = 0;
+  cut_corners(
+      piece, axis, at, [&](const Corner& corner) { lower.add(corner); },
+      [&](const Corner& corner) { upper.add(corner); });
+}
+
+/// One part alone.
+template <int kDimensions>
+Piece<kDimensions> part_of(const Piece<kDimensions>& piece, int axis, double at, bool is_upper) {
+  using Corner = PieceCorner<kDimensions>;
+  Piece<kDimensions> part;
+  const auto keep = [&](const Corner& corner) { part.add(corner); };
+  const auto drop = [](const Corner&) {};
+  if (is_upper)
+    cut_corners(piece, axis, at, drop, keep);
+  else
+    cut_corners(piece, axis, at, keep, drop);
+  return part;
 }
 
 }  // namespace hilbrush

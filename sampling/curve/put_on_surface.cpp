@@ -63,31 +63,4 @@ SurfacePoint point_with_tone(const ToneField& field, std::uint32_t triangle, std
   return {triangle, {1 - centre.sum(), centre.x(), centre.y()}};
 }
 
-Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& place,
-             std::uint32_t component) {
-  const DotSurface& surface = curve.dot_surfaces[place.triangle];
-  // A beam that is aimed at the very edge of an open surface may pass it by.
-  SurfacePoint point = place;
-  bool is_moved = false;
-  for (int c = 0; c < 3; ++c) {
-    const auto least = static_cast<double>(surface.least_barycentric[static_cast<std::size_t>(c)]);
-    if (point.barycentric[c] >= least) continue;
-    point.barycentric[c] = least;
-    is_moved = true;
-  }
-  if (is_moved) point.barycentric /= point.barycentric.sum();
-  Dot dot;
-  dot.position_O = position(curve.mesh, point);
-  dot.normal_O = surface.normal;
-  Eigen::Vector3f smooth = Eigen::Vector3f::Zero();
-  for (int c = 0; c < 3; ++c)
-    smooth += static_cast<float>(point.barycentric[c]) * surface.corner_normals[static_cast<std::size_t>(c)];
-  const float norm = smooth.norm();
-  dot.smooth_normal_O = norm > 1e-3f ? Eigen::Vector3f(smooth / norm) : dot.normal_O;
-  dot.triangle = point.triangle;
-  dot.component = component;
-  dot.tone = static_cast<float>(tone.wanted(point));
-  return dot;
-}
-
 }  // namespace hilbrush

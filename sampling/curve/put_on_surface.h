@@ -3,7 +3,7 @@
 
 #include "sampling/curve/surface_curve.h"
 
-/// Places on the surface, and the dots there.
+/// Places on the surface.
 namespace hilbrush {
 
 /// The surface point nearest to `target_O` near `start`: a short walk from triangle to triangle.
@@ -20,9 +20,5 @@ NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t triangl
 /// A point of a polygon within a triangle that asks for dots, by halving it towards its mass; its corners by second and
 /// third barycentric coordinate. The polygon's middle if it has no mass.
 SurfacePoint point_with_tone(const ToneField& tone, std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon);
-
-/// The dot at a surface point, moved a hair inside its triangle.
-Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& point,
-             std::uint32_t component);
 
 }  // namespace hilbrush

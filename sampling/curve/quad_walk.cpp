@@ -4,24 +4,6 @@
 
 namespace hilbrush {
 
-FaceFrame::FaceFrame(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face)
-    : triangle(face.triangle),
-      origin_O(mesh.corner(face.triangle, 0)),
-      e1_O(mesh.corner(face.triangle, 1) - origin_O),
-      e2_O(mesh.corner(face.triangle, 2) - origin_O),
-      place(face.places[0]) {
-  const auto corners = sheet.corners_b(face);
-  b = corners[0];
-  face_to_b.col(0) = corners[1] - corners[0];
-  face_to_b.col(1) = corners[2] - corners[0];
-  const Eigen::Vector2d u = face.places[1] - place, v = face.places[2] - place;
-  const double determinant = u.x() * v.y() - u.y() * v.x();
-  to_face << v.y(), -v.x(), -u.y(), u.x();
-  to_face *= 1 / determinant;
-  space = e1_O.cross(e2_O).norm();
-  density = std::abs(face_to_b.determinant() / determinant) * space;
-}
-
 template <class Curve>
 const typename QuadWalk<Curve>::Held& QuadWalk<Curve>::heaviest(const Node& node) const {
   return held_[*std::max_element(node.pieces.begin(), node.pieces.end(), [&](std::uint32_t a, std::uint32_t c) {
@@ -33,21 +15,17 @@ template <class Curve>
 void QuadWalk<Curve>::hold_pieces(const QuadMass& quad, const BaseQuad& base, Node& node) {
   const Sheet& sheet = mass_.sheet_of(quad);
   const PieceMass* pieces = mass_.pieces_of(quad);
-  tones_.clear();
-  held_.clear();
+  held_count_ = 0;
   roots_.clear();
   for (std::uint32_t i = 0; i < base.face_count; ++i) {
-    const SheetFace& face = sheet.face_of(base, i);
-    tones_.push_back(mass_.tone.on(face.triangle));
     if (!(pieces[i].mass > 0)) continue;
-    Held held;
+    roots_.push_back(static_cast<std::uint32_t>(held_count_));
+    Held& held = push();
     held.frame = i;
     held.integral = pieces[i].integral();
-    held.piece = whole_piece<kDimensions>(sheet, mass_.curve.mesh, face);
+    held.piece = whole_piece<kDimensions>(sheet, mass_.curve.mesh, sheet.face_of(base, i));
     clip_to_box<kDimensions>(held.piece, node.low, node.size);
-    held.integral.area_m2 = held.piece.area_b() * frames_[i].space;
-    roots_.push_back(static_cast<std::uint32_t>(held_.size()));
-    held_.push_back(held);
+    held.integral.area_m2 = held.piece.area_b() * frame(i).space;
   }
   node.pieces = roots_;
 }
@@ -59,7 +37,7 @@ bool QuadWalk<Curve>::is_even(const Node& node) const {
   double squares = 0, mass = 0;
   for (const auto index : node.pieces) {
     const Held& held = held_[index];
-    squares += frames_[held.frame].density * held.integral.square;
+    squares += frame(held.frame).density * held.integral.square;
     mass += held.integral.mass;
   }
   return squares * node.size * node.size - mass * mass <= rule_.small_mass() * rule_.small_mass();
@@ -87,30 +65,36 @@ void QuadWalk<Curve>::distribute(const Node& node, std::uint32_t piece, int axis
     if (high <= at) break;
     if (low >= at) continue;
     halve(piece, axis, at);
-    const auto upper = static_cast<std::uint32_t>(held_.size() - 1);
+    const auto upper = static_cast<std::uint32_t>(held_count_ - 1);
     distribute(node, upper - 1, axis + 1, place + part * stride, stride * Curve::kSide, children);
     piece = upper;
   }
   distribute(node, piece, axis + 1, place + part * stride, stride * Curve::kSide, children);
 }
 
+template <class Curve>
+typename QuadWalk<Curve>::Held& QuadWalk<Curve>::push() {
+  if (held_count_ == held_.size()) held_.resize(2 * held_count_ + 64);
+  return held_[held_count_++];
+}
+
 /// Puts the lower and the upper part of a piece on the stack. One of their integrals is what the other leaves.
 template <class Curve>
 void QuadWalk<Curve>::halve(std::uint32_t index, int axis, double at) {
+  push();
+  Held& upper = push();
+  Held& lower = held_[held_count_ - 2];
   const Held& whole = held_[index];
-  Held lower, upper;
   lower.frame = upper.frame = whole.frame;
   cut_piece(whole.piece, axis, at, lower.piece, upper.piece);
   const bool is_lower_smaller = lower.piece.area_b() < upper.piece.area_b();
   Held& smaller = is_lower_smaller ? lower : upper;
   Held& larger = is_lower_smaller ? upper : lower;
-  smaller.integral = integrate(tones_[whole.frame], smaller.piece);
+  smaller.integral = integrate(store_.tone_on(*frames_[whole.frame]), smaller.piece);
   const ToneIntegral &all = whole.integral, &part = smaller.integral;
   larger.integral = {all.area_m2 - part.area_m2, all.mass - part.mass, all.first - part.first,
                      std::max(0., all.square - part.square)};
   if (larger.integral.mass < kRoundingShare * all.mass) larger.integral = {};
-  held_.push_back(lower);
-  held_.push_back(upper);
 }
 
 template class QuadWalk<HilbertQuad>;

@@ -7,6 +7,7 @@
 
 #include "sampling/curve/curve_mass.h"
 #include "sampling/curve/curve_moment.h"
+#include "sampling/curve/face_frame.h"
 
 /// The walk along the curve below the base tree: from a base quad to its patches, in order, made anew each time and
 /// never stored. After the thesis, section 4.2 and equations 7.3, 7.4; differs: the deviation is exact and decides on
@@ -27,24 +28,6 @@ enum class PatchKind : std::uint8_t {
   kWhole,  ///< nothing is asked for inside: to be taken as it is
   kEven,   ///< its mass lies evenly on the square
   kSmall   ///< too little mass to be divided
-};
-
-/// A face of a base quad, with the affine maps of its triangle.
-struct FaceFrame {
-  FaceFrame(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face);
-
-  std::uint32_t triangle;
-  Eigen::Vector3d origin_O, e1_O, e2_O;  ///< corner 0 of the triangle; from there to corners 1 and 2
-  Eigen::Vector2d place;                 ///< of the face's first corner
-  Eigen::Matrix2d to_face;               ///< from there to coordinates along the face's sides
-  Eigen::Vector2d b;                     ///< barycentric coordinates of the face's first corner
-  Eigen::Matrix2d face_to_b;
-  double space;    ///< m^2 for a unit of barycentric area
-  double density;  ///< m^2 for a unit of the square; infinite where the map has no area
-
-  Eigen::Vector3d at(const Eigen::Vector2d& point_b) const {
-    return origin_O + point_b.x() * e1_O + point_b.y() * e2_O;
-  }
 };
 
 /// Integrals over a piece; nothing if it is empty.
@@ -82,7 +65,8 @@ class QuadWalk {
     ToneIntegral integral;
   };
 
-  QuadWalk(const CurveMass::Implementation& mass, const PatchRule& rule) : mass_(mass), rule_(rule) {}
+  QuadWalk(const CurveMass::Implementation& mass, const PatchRule& rule)
+      : mass_(mass), rule_(rule), store_(mass.tone) {}
 
   template <class Sink>
   void walk(std::size_t quad_index, Sink& sink) {
@@ -90,7 +74,6 @@ class QuadWalk {
     const BaseQuad& base = mass_.base_quad(quad);
     sheet_index_ = quad.sheet;
     quad_index_ = quad_index;
-    frames_.clear();
     Node node;
     node.low = base.low.template head<kDimensions>();
     node.size = base.size;
@@ -99,8 +82,7 @@ class QuadWalk {
     node.at = mass_.mass_before[quad_index];
     node.mass = mass_.mass_of(quad_index);
     if (!(node.mass > 0)) return;
-    for (std::uint32_t i = 0; i < base.face_count; ++i)
-      frames_.emplace_back(mass_.sheet_of(quad), mass_.curve.mesh, mass_.sheet_of(quad).face_of(base, i));
+    store_.fetch(mass_.sheet_of(quad), base, frames_);
     if (rule_.uniform_depth < 0 && node.mass > rule_.small_mass() && quad.misplaced <= rule_.small_mass())
       return sink.take(*this, node, PatchKind::kEven);
     hold_pieces(quad, base, node);
@@ -109,22 +91,24 @@ class QuadWalk {
 
   /// Goes on with pieces that the square has shrunk to nothing.
   template <class Sink>
-  void walk_pieces(std::uint32_t sheet, std::size_t quad_index, std::vector<FaceFrame> frames,
-                   std::vector<TriangleTone> tones, std::vector<Held> held, Node node, Sink& sink) {
+  void walk_pieces(std::uint32_t sheet, std::size_t quad_index, const std::vector<FaceFrame*>& frames,
+                   std::vector<Held> held, Node node, Sink& sink) {
     sheet_index_ = sheet;
     quad_index_ = quad_index;
-    frames_ = std::move(frames);
-    tones_ = std::move(tones);
+    frames_ = frames;
     held_ = std::move(held);
+    held_count_ = held_.size();
     roots_.clear();
-    for (std::uint32_t i = 0; i < held_.size(); ++i) roots_.push_back(i);
+    for (std::uint32_t i = 0; i < held_count_; ++i) roots_.push_back(i);
     node.pieces = roots_;
     divide(node, sink);
   }
 
   std::uint32_t sheet() const { return sheet_index_; }
   std::size_t quad() const { return quad_index_; }
-  const std::vector<FaceFrame>& frames() const { return frames_; }
+  /// Of the base quad's faces.
+  std::uint32_t frame_count() const { return static_cast<std::uint32_t>(frames_.size()); }
+  const FaceFrame& frame(std::uint32_t i) const { return *frames_[i]; }
   const Held& held(std::uint32_t piece) const { return held_[piece]; }
   const PatchRule& rule() const { return rule_; }
   /// The heaviest of a node's pieces, which has some unless it is an even base quad.
@@ -143,6 +127,8 @@ class QuadWalk {
   void distribute(const Node& node, std::uint32_t piece, int axis, unsigned place, unsigned stride,
                   std::vector<std::vector<std::uint32_t>>& children);
   void halve(std::uint32_t index, int axis, double at);
+  /// The next piece on the stack, which may move all pieces.
+  Held& push();
 
   template <class Sink>
   void divide(const Node& node, Sink& sink, int level = 0) {
@@ -159,7 +145,7 @@ class QuadWalk {
       if (node.size < kSmallest) return divide_in_space(node, sink);
     if (levels_.size() <= static_cast<std::size_t>(level)) levels_.emplace_back(new Level{});
     auto& children = levels_[static_cast<std::size_t>(level)]->children;
-    const std::size_t held_before = held_.size();
+    const std::size_t held_before = held_count_;
     cut_into_children(node, children);
     std::array<double, Curve::kChildCount> masses{};
     double sum = 0;
@@ -168,7 +154,7 @@ class QuadWalk {
       sum += masses[place];
     }
     if (!(sum > 0)) {
-      held_.resize(held_before);
+      held_count_ = held_before;
       return sink.take(*this, node, PatchKind::kSmall);
     }
     Node child;
@@ -186,7 +172,7 @@ class QuadWalk {
       divide(child, sink, level + 1);
       child.at += child.mass;
     }
-    held_.resize(held_before);
+    held_count_ = held_before;
   }
 
   template <class Sink>
@@ -200,9 +186,10 @@ class QuadWalk {
   PatchRule rule_;
   std::uint32_t sheet_index_ = 0;
   std::size_t quad_index_ = 0;
-  std::vector<FaceFrame> frames_;
-  std::vector<TriangleTone> tones_;  ///< of the frames, while pieces are held
-  std::vector<Held> held_;           ///< a stack
+  FaceFrames store_;
+  std::vector<FaceFrame*> frames_;
+  std::vector<Held> held_;  ///< a stack; never shorter than it was, so that it is not cleared again and again
+  std::size_t held_count_ = 0;
   std::vector<std::uint32_t> roots_;
   std::vector<std::unique_ptr<Level>> levels_;
   std::unique_ptr<QuadWalk<HilbertCube>> in_space_;
@@ -220,7 +207,7 @@ void QuadWalk<Curve>::divide_in_space(const Node& node, Sink& sink) {
     there.frame = mine.frame;
     there.integral = mine.integral;
     for (const auto& corner : mine.piece.all()) {
-      const Eigen::Vector3d p = frames_[mine.frame].at(corner.b);
+      const Eigen::Vector3d p = frame(mine.frame).at(corner.b);
       there.piece.add({p, corner.b});
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
@@ -234,7 +221,7 @@ void QuadWalk<Curve>::divide_in_space(const Node& node, Sink& sink) {
   there.at = node.at;
   there.mass = node.mass;
   there.scale = node.scale;
-  in_space_->walk_pieces(sheet_index_, quad_index_, frames_, tones_, std::move(held), there, sink);
+  in_space_->walk_pieces(sheet_index_, quad_index_, frames_, std::move(held), there, sink);
 }
 
 extern template class QuadWalk<HilbertQuad>;

@@ -211,7 +211,6 @@ template Piece<3> whole_piece<3>(const Sheet&, const TexturedMesh&, const SheetF
 
 template <int kDimensions>
 void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size) {
-  Piece<kDimensions> below, above;
   for (int axis = 0; axis < kDimensions; ++axis) {
     double least = std::numeric_limits<double>::infinity(), most = -least;
     for (const auto& corner : piece.all()) {
@@ -220,14 +219,8 @@ void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensi
     }
     const double high = low[axis] + size;
     if (most < low[axis] || least > high) piece.corner_count = 0;
-    if (least < low[axis]) {
-      cut_piece(piece, axis, low[axis], below, above);
-      piece = above;
-    }
-    if (most > high) {
-      cut_piece(piece, axis, high, below, above);
-      piece = below;
-    }
+    if (least < low[axis]) piece = part_of(piece, axis, low[axis], true);
+    if (most > high) piece = part_of(piece, axis, high, false);
   }
 }
 template void clip_to_box<2>(Piece<2>&, const Eigen::Vector2d&, double);

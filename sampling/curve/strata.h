@@ -37,6 +37,8 @@ struct DotPlan {
 ///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as shares of
 ///                                                        its mass
 ///   void close(std::uint64_t index)                      it is complete
+///   void add_stratum(walk, node, kind, double from, double to, std::uint64_t index)   both at once: a stratum in one
+///   patch
 template <class Consumer>
 class StrataCutter {
  public:
@@ -58,11 +60,17 @@ class StrataCutter {
 
   template <class Walk, class Node>
   void take(const Walk& walk, const Node& node, PatchKind kind) {
-    cut(node.at, node.mass, [&](double from, double to) { consumer_.add(walk, node, kind, from, to); });
+    cut(
+        node.at, node.mass, [&](double from, double to) { consumer_.add(walk, node, kind, from, to); },
+        [&](double from, double to) { consumer_.add_stratum(walk, node, kind, from, to, index_); });
   }
   /// A base quad too light to be looked into.
   void take_quad(std::size_t quad, double at, double mass) {
-    cut(at, mass, [&](double from, double to) { consumer_.add_quad(quad, from, to); });
+    const auto add = [&](double from, double to) { consumer_.add_quad(quad, from, to); };
+    cut(at, mass, add, [&](double from, double to) {
+      add(from, to);
+      consumer_.close(index_);
+    });
   }
 
   /// The curve is over: what rounding has left open ends here.
@@ -71,14 +79,21 @@ class StrataCutter {
   }
 
  private:
-  template <class Add>
-  void cut(double at, double mass, Add add) {
+  template <class Add, class AddStratum>
+  void cut(double at, double mass, Add add, AddStratum add_stratum) {
     double share = 0;
-    while (next_ < at + mass && !is_done()) {
+    bool begins_here = false;  // the current stratum
+    for (; next_ < at + mass && !is_done(); begins_here = true) {
       const double next = std::clamp((next_ - at) / mass, share, 1.);
-      if (is_open_ && next > share) add(share, next);
+      if (begins_here && next > share) {
+        add_stratum(share, next);
+        ++index_;
+        go_on();
+      } else {
+        if (is_open_ && next > share) add(share, next);
+        pass();
+      }
       share = next;
-      pass();
     }
     if (is_open_ && !is_done() && share < 1) add(share, 1.);
   }
@@ -86,6 +101,10 @@ class StrataCutter {
   void pass() {
     if (is_open_) consumer_.close(index_++);
     is_open_ = true;
+    go_on();
+  }
+
+  void go_on() {
     next_ = index_ + 1 < strata_.count ? strata_.begin_of(index_ + 1) : std::numeric_limits<double>::infinity();
   }
 
@@ -181,12 +200,11 @@ inline constexpr double kLightShare = .5;
 ///   void add_quads(std::size_t first, std::size_t last)           `last` not included
 ///   void add_quad(std::size_t quad, double from, double to)   shares of its mass
 template <class Consumer>
-void cut_strata(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Consumer& consumer,
+void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,
                 std::vector<std::size_t>& patches_at_depth) {
   const CurveMass::Implementation& mass = plan.mass;
   StrataCutter cutter(plan.strata, first, last, consumer);
   CountingSink sink(cutter, patches_at_depth);
-  Walks walks(plan);
   const std::size_t end = mass.quads.size();
   for (std::size_t q = mass.quad_at(plan.strata.begin_of(first)); q < end && !cutter.is_done();) {
     const auto is_walked = [&] {
@@ -216,12 +234,11 @@ void cut_strata(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Co
 /// left beyond the last quad by
 ///   void put_in_quad(std::size_t quad)
 template <class Consumer>
-void find_places(const DotPlan& plan, std::uint64_t first, std::uint64_t last, Consumer& consumer,
+void find_places(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,
                  std::vector<std::size_t>& patches_at_depth) {
   const CurveMass::Implementation& mass = plan.mass;
   PlaceFinder finder(*plan.sequence, mass.total(), first, last, consumer);
   CountingSink sink(finder, patches_at_depth);
-  Walks walks(plan);
   std::size_t last_quad = 0;
   for (std::size_t q = mass.quad_at(mass.total() * plan.sequence->at(first)); q < mass.quads.size(); ++q) {
     if (finder.is_done()) return;

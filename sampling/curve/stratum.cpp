@@ -38,12 +38,17 @@ SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t 
 std::size_t nearest_quad(const CurveMass::Implementation& mass, const StratumPart& part,
                          const Eigen::Vector3d& target_O) {
   std::size_t nearest = part.heaviest_quad;
-  double least = std::numeric_limits<double>::infinity();
+  // Distances times mass are compared crosswise, without a division.
+  double least = std::numeric_limits<double>::infinity(), mass_of_nearest = 1;
   for (std::size_t q = part.first_quad; q < part.last_quad; ++q) {
     const double quad_mass = mass.mass_of(q);
     if (!(quad_mass > 0)) continue;
-    const double distance2 = (mass.quads[q].moment_O / quad_mass - target_O).squaredNorm();
-    if (distance2 < least) nearest = q, least = distance2;
+    const double distance = (mass.quads[q].moment_O - quad_mass * target_O).squaredNorm();
+    if (distance * mass_of_nearest < least * quad_mass * quad_mass) {
+      nearest = q;
+      least = distance;
+      mass_of_nearest = quad_mass * quad_mass;
+    }
   }
   return nearest;
 }
@@ -78,7 +83,12 @@ SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t q
   return point_with_tone(mass.tone, face.triangle, polygon);
 }
 
-SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, const StratumPart& part) {
+bool is_surely_painted(double asked) {
+  return asked >= kSurelyPainted;
+}
+
+SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles,
+                               const StratumPart& part) {
   SurfacePoint point;
   if (part.triangle != kNoTriangle) {
     // A stratum in the plane of one triangle needs no search.
@@ -90,10 +100,11 @@ SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, const Stra
                                    : nearest_in_quad(mass, nearest_quad(mass, part, target), target);
     point = walk_towards(mass.curve.mesh, mass.curve.neighbours, start, target);
   }
-  const double asked = mass.tone.asked(point);
-  if (asked >= kSurelyPainted) return point;
+  const double asked = triangles[point.triangle].asked(point.barycentric);
+  if (is_surely_painted(asked)) return point;
   const SurfacePoint heaviest = heaviest_point(mass, part);
-  return asked > 0 && asked >= kBlankShare * mass.tone.asked(heaviest) ? point : heaviest;
+  return asked > 0 && asked >= kBlankShare * triangles[heaviest.triangle].asked(heaviest.barycentric) ? point
+                                                                                                      : heaviest;
 }
 
 }  // namespace hilbrush

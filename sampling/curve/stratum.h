@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sampling/curve/curve_mass.h"
+#include "sampling/curve/dot_triangle.h"
 
 /// What a stratum gathers from the patches that it is made of, until it is known where its dot goes.
 namespace hilbrush {
@@ -61,8 +62,11 @@ class Stratum {
   StratumPart current_, best_;
 };
 
+/// No stratum's mass is such that a place which asks for so much is blank beside it.
+bool is_surely_painted(double asked);
+
 /// The stratum's centre of mass, put back on the surface; where that is blank, a painted point of its heaviest bit.
-SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, const StratumPart& part);
+SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles, const StratumPart& part);
 
 /// A painted point of a base quad that has mass, in the triangle that has most.
 SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad);

@@ -27,8 +27,7 @@ std::vector<DotSurface> find_dot_surfaces(const TexturedMesh& mesh, const Neighb
     result[t].corner_normals = corner_normals[t];
     for (int c = 0; c < 3; ++c) {
       const double opposite = (mesh.corner(t, (c + 1) % 3) - mesh.corner(t, (c + 2) % 3)).norm();
-      result[t].least_barycentric[static_cast<std::size_t>(c)] =
-          static_cast<float>(std::min(kMostInsetShare, kInsetM * opposite / (2 * area)));
+      result[t].least_barycentric[c] = static_cast<float>(std::min(kMostInsetShare, kInsetM * opposite / (2 * area)));
     }
   }
   return result;

@@ -13,7 +13,7 @@ namespace hilbrush {
 struct DotSurface {
   Eigen::Vector3f normal;                         ///< unit
   std::array<Eigen::Vector3f, 3> corner_normals;  ///< unit, over smooth edges
-  std::array<float, 3> least_barycentric;         ///< of a point that is a hair inside
+  Eigen::Vector3f least_barycentric;              ///< of a point that is a hair inside
 };
 
 struct SurfaceCurve::Implementation {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "sampling/curve/dot_triangle.h"
 #include "sampling/gaps/dot_path.h"
 #include "sampling/gaps/gap_meter.h"
 #include "sampling/gaps/square_places.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "sampling/check.h"
-#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/dot_triangle.h"
 #include "sampling/disk/components.h"
 #include "sampling/input_error.h"
 #include "sampling/laminar/contours.h"

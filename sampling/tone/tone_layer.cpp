@@ -3,28 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "sampling/check.h"
+#include "sampling/tone/boundary_walk.h"
 
 namespace hilbrush {
 namespace {
 
 using Index = std::int64_t;
 
-/// std::floor, which without SSE 4.1 is a call.
-Index floor_index(double x) {
-  const auto i = static_cast<Index>(x);
-  return i - (static_cast<double>(i) > x ? 1 : 0);
-}
-
-/// Where the integer grid line `i` of an unbounded picture finds its texel.
-Index texel_index(Index i, int size, bool repeats) {
-  if (i >= 0 && i < size) return i;
-  if (!repeats) return i < 0 ? 0 : size - 1;
-  const Index r = i % size;
-  return r < 0 ? r + size : r;
-}
+/// Farther from the picture's own texels columns are not counted one by one.
+constexpr double kFar = 1e9;
 
 /// The column (or row) that holds `x`, when walking in direction `step`. Without repeats all before texel 0 is column
 /// -1, and all after the last texel is the last column: the tone does not change there.
@@ -36,12 +25,6 @@ inline Index column_of(double x, double step, int size, bool repeats) {
   return repeats ? walked : std::clamp<Index>(walked, -1, size - 1);
 }
 
-/// Gauss, three places: exact to degree 5. The middle one is there twice, each time with half its weight: four places
-/// fill whole registers.
-using FourPlaces = Eigen::Array4d;
-const FourPlaces kGaussPlaces(0.1127016653792583, 0.5, 0.5, 0.8872983346207417);
-const FourPlaces kGaussWeights(5. / 18, 4. / 18, 4. / 18, 5. / 18);
-
 /// Dunavant's rule of degree 4 on a triangle: two orbits of three places each, by the barycentric coordinate that
 /// differs, the other one, and the weight.
 struct Orbit {
@@ -52,72 +35,124 @@ constexpr std::array<Orbit, 2> kTriangleOrbits{{{0.108103018168070, 0.4459484909
 
 }  // namespace
 
-/// The tone at the four texels of one cell of the grid of texel centres; bilinear between them.
-struct ToneLayer::Corners {
-  double a, b;  ///< lower row: left and right
-  double c, d;  ///< upper row
-
-  /// The tone at height t is level(t) + slope(t) s.
-  template <class Places>
-  Places level(const Places& t) const {
-    return a + t * (c - a);
-  }
-  template <class Places>
-  Places slope(const Places& t) const {
-    return b - a + t * (d - c - b + a);
-  }
-};
-
-/// Walks a polygon's edges through the texels. Between rows j and j + 1 the tone is (1 - t) f(x) + t g(x), t = y - j,
-/// where f and g are piecewise linear; their integrals along x, from a fixed column x0, are kept while the walk crosses
-/// columns.
-class ToneLayer::BoundaryWalk {
+/// The cells around a small polygon, all made beforehand: most of its edges pass most of them.
+class ToneLayer::WindowCells {
  public:
-  BoundaryWalk(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0)
-      : layer_(layer), addressing_(addressing), x0_(x0), y0_(y0) {}
+  static constexpr Index kMostCells = 36;
 
-  /// p and q relative to (x0, y0).
-  void add_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-    const Eigen::Vector2d d = q - p;
-    result_.area += .5 * (p.x() + q.x()) * d.y();
-    if (d.y() == 0) return;  // the integrals are along dy
-    const double per_column = 1 / d.x(), per_row = 1 / d.y();
-    column_ = column_of(p.x() + static_cast<double>(x0_), d.x(), layer_.width_, addressing_.repeat_x);
-    enter_row(column_of(p.y() + static_cast<double>(y0_), d.y(), layer_.height_, addressing_.repeat_y));
-    const int column_step = d.x() > 0 ? 1 : -1, row_step = d.y() > 0 ? 1 : -1;
-    for (double t = 0;;) {
-      const double t_x =
-          crossing(column_ - x0_, p.x(), d.x(), per_column, column_, layer_.width_, addressing_.repeat_x);
-      const double t_y = crossing(row_ - y0_, p.y(), d.y(), per_row, row_, layer_.height_, addressing_.repeat_y);
-      const double end = std::clamp(std::min(t_x, t_y), t, 1.);
-      if (end > t) add_piece(p + t * d, p + end * d);
-      t = end;
-      if (t >= 1) break;
-      if (t_x <= t_y)
-        enter_column(column_ + column_step);
-      else
-        enter_row(row_ + row_step);
+  WindowCells(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0, Index columns, Index rows)
+      : columns_(columns), rows_(rows) {
+    std::array<Index, kMostCells + 1> texels;
+    for (Index i = 0; i <= columns; ++i)
+      texels[static_cast<std::size_t>(i)] = texel_index(x0 + i, layer.width_, addressing.repeat_x);
+    const auto fill = [&](Index row, Line& line) {
+      const float* tones = layer.row(row, addressing);
+      TexelOnLine sum{};
+      for (std::size_t i = 0; i <= static_cast<std::size_t>(columns); ++i) {
+        const double tone = tones[texels[i]], left = static_cast<double>(i) - 1;
+        if (i > 0) {
+          const double before = sum.tone, f = .5 * (before + tone);
+          sum.f += f;
+          sum.xf += left * f + before * (1. / 6) + tone * (1. / 3);
+          sum.ff += (before * before + before * tone + tone * tone) * (1. / 3);
+        }
+        sum.tone = tone;
+        line[i] = sum;
+      }
+    };
+    std::array<Line, 2> lines;
+    fill(y0, lines[0]);
+    BoundaryCell* cell = cells_.data();
+    for (Index row = 0; row < rows; ++row) {
+      const Line& lower = lines[static_cast<std::size_t>(row % 2)];
+      Line& upper = lines[static_cast<std::size_t>((row + 1) % 2)];
+      fill(y0 + row + 1, upper);
+      double fg = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(columns); ++i) {
+        const TexelOnLine &a = lower[i], &b = lower[i + 1], &c = upper[i], &d = upper[i + 1];
+        *cell++ = {static_cast<double>(i),
+                   static_cast<double>(row),
+                   {a.tone, b.tone, c.tone, d.tone},
+                   {a.f, c.f, a.xf, c.xf, a.ff, fg, c.ff}};
+        fg += (a.tone * c.tone + .5 * (a.tone * d.tone + b.tone * c.tone) + b.tone * d.tone) * (1. / 3);
+      }
     }
   }
 
-  const TexelIntegral& result() const { return result_; }
-
- private:
-  /// Integrals along x from x0: of f, g, x f, x g, f^2, f g, g^2.
-  struct RowSums {
-    double f = 0, g = 0, xf = 0, xg = 0, ff = 0, fg = 0, gg = 0;
-  };
-
-  /// Where along the edge the walk leaves its column (or row).
-  static double crossing(Index relative, double from, double step, double per_step, Index index, int size,
-                         bool repeats) {
-    constexpr double kNever = std::numeric_limits<double>::infinity();
-    if (step > 0) return !repeats && index == size - 1 ? kNever : (static_cast<double>(relative + 1) - from) * per_step;
-    if (step < 0) return !repeats && index == -1 ? kNever : (static_cast<double>(relative) - from) * per_step;
-    return kNever;
+  static Index column_of(double x, double step) {
+    const auto column = static_cast<Index>(x);
+    return step < 0 && static_cast<double>(column) == x ? column - 1 : column;
+  }
+  static Index row_of(double y, double step) { return column_of(y, step); }
+  void enter(Index column, Index row) { column_ = column, row_ = row; }
+  static bool has_next_column(double) { return true; }
+  static bool has_next_row(double) { return true; }
+  void step(int columns, int rows) { column_ += columns, row_ += rows; }
+  /// Rounding may lead an edge's end over the window's side; the tone goes on there.
+  const BoundaryCell& here() const {
+    return cells_[static_cast<std::size_t>(std::clamp<Index>(row_, 0, rows_ - 1) * columns_ +
+                                           std::clamp<Index>(column_, 0, columns_ - 1))];
   }
 
-  Corners corners(Index column) const {
+ private:
+  /// A texel, and the integrals along its row up to it.
+  struct TexelOnLine {
+    double tone, f, xf, ff;
+  };
+  using Line = std::array<TexelOnLine, kMostCells + 1>;
+
+  Index columns_, rows_;
+  Index column_ = 0, row_ = 0;
+  std::array<BoundaryCell, kMostCells> cells_;
+};
+
+/// The cells along the way through a large polygon. Between rows j and j + 1 the tone is (1 - t) f(x) + t g(x), t = y -
+/// j, where f and g are piecewise linear; their integrals along x, from a fixed column x0, are kept while the walk
+/// crosses columns.
+class ToneLayer::WalkedCells {
+ public:
+  WalkedCells(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0)
+      : layer_(layer), addressing_(addressing), x0_(x0), y0_(y0) {}
+
+  Index column_of(double x, double step) const {
+    return hilbrush::column_of(x + static_cast<double>(x0_), step, layer_.width_, addressing_.repeat_x) - x0_;
+  }
+  Index row_of(double y, double step) const {
+    return hilbrush::column_of(y + static_cast<double>(y0_), step, layer_.height_, addressing_.repeat_y) - y0_;
+  }
+  void enter(Index column, Index row) {
+    column_ = column + x0_;
+    enter_row(row + y0_);
+  }
+  /// Beyond the first and the last texel of a picture that does not repeat there are no more columns.
+  bool has_next_column(double step) const {
+    return addressing_.repeat_x || (step > 0 ? column_ < layer_.width_ - 1 : column_ > -1);
+  }
+  bool has_next_row(double step) const {
+    return addressing_.repeat_y || (step > 0 ? row_ < layer_.height_ - 1 : row_ > -1);
+  }
+
+  void step(int columns, int rows) {
+    if (columns == 0) return enter_row(row_ + rows);
+    if (columns > 0) {
+      if (column_ >= x0_) add_column(here_, static_cast<double>(column_ - x0_), 1);
+      here_ = tones(++column_);
+    } else {
+      here_ = tones(--column_);
+      if (column_ >= x0_) add_column(here_, static_cast<double>(column_ - x0_), -1);
+    }
+  }
+
+  const BoundaryCell& here() {
+    BoundaryCell& cell = cells_[next_];
+    next_ = next_ + 1 == cells_.size() ? 0 : next_ + 1;
+    // Left of texel 0 of a picture that does not repeat the column has no left end; the integrals start at x0 = 0.
+    cell = {static_cast<double>(std::max(column_, x0_) - x0_), static_cast<double>(row_ - y0_), here_, sums_};
+    return cell;
+  }
+
+ private:
+  CellTones tones(Index column) const {
     const Index left = texel_index(column, layer_.width_, addressing_.repeat_x);
     const Index right = texel_index(column + 1, layer_.width_, addressing_.repeat_x);
     return {lower_[left], lower_[right], upper_[left], upper_[right]};
@@ -131,8 +166,8 @@ class ToneLayer::BoundaryWalk {
     if (column_ - x0_ > 2 * kBlock)
       sums_ = long_row_sums();
     else
-      for (Index i = x0_; i < column_; ++i) add_column(corners(i), static_cast<double>(i - x0_), 1);
-    here_ = corners(column_);
+      for (Index i = x0_; i < column_; ++i) add_column(tones(i), static_cast<double>(i - x0_), 1);
+    here_ = tones(column_);
   }
 
   /// From the stored prefixes, those of whole repeats taken off.
@@ -149,19 +184,8 @@ class ToneLayer::BoundaryWalk {
     return {low.f, high.f, low.xf, high.xf, low.ff, lower_ == upper_ ? low.ff : low.fg, high.ff};
   }
 
-  void enter_column(Index column) {
-    if (column > column_) {
-      if (column_ >= x0_) add_column(here_, static_cast<double>(column_ - x0_), 1);
-      here_ = corners(column);
-    } else {
-      here_ = corners(column);
-      if (column >= x0_) add_column(here_, static_cast<double>(column - x0_), -1);
-    }
-    column_ = column;
-  }
-
   /// Adds the integrals over a whole column, times `sign`.
-  void add_column(const Corners& k, double left, double sign) {
+  void add_column(const CellTones& k, double left, double sign) {
     const double f = .5 * (k.a + k.b), g = .5 * (k.c + k.d);
     sums_.f += sign * f;
     sums_.g += sign * g;
@@ -173,41 +197,23 @@ class ToneLayer::BoundaryWalk {
     sums_.gg += third * (k.c * k.c + k.c * k.d + k.d * k.d);
   }
 
-  /// A straight piece within one column and row: the integrands are polynomials of degree at most 5 along it.
-  void add_piece(const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-    // Left of texel 0 of a picture that does not repeat the column has no left end; the integrals start at x0 = 0.
-    const double left = static_cast<double>(std::max(column_, x0_) - x0_), low = static_cast<double>(row_ - y0_);
-    const double dx = q.x() - p.x(), dy = q.y() - p.y();
-    const FourPlaces y = p.y() + kGaussPlaces * dy, t = y - low, u = 1 - t, s = p.x() - left + kGaussPlaces * dx;
-    const FourPlaces level = here_.level(t), slope = here_.slope(t);
-    const FourPlaces here = s * (level + s * (.5 * slope));
-    const FourPlaces weighted = kGaussWeights * (sums_.f + t * (sums_.g - sums_.f) + here);
-    const FourPlaces x_mass =
-        sums_.xf + t * (sums_.xg - sums_.xf) + left * here + s * s * (.5 * level + s * slope * (1. / 3));
-    const FourPlaces row_square = u * (u * sums_.ff + t * (2 * sums_.fg)) + t * t * sums_.gg;
-    const FourPlaces mean_square = level * level + s * slope * (level + s * slope * (1. / 3));
-    const FourPlaces square = row_square + s * mean_square;
-    result_.mass += dy * weighted.sum();
-    result_.first.x() += dy * (kGaussWeights * x_mass).sum();
-    result_.first.y() += dy * (weighted * y).sum();
-    result_.square += dy * (kGaussWeights * square).sum();
-  }
-
   const ToneLayer& layer_;
   TexelAddressing addressing_;
   Index x0_, y0_;
   Index column_ = 0, row_ = 0;
   const float* lower_ = nullptr;
   const float* upper_ = nullptr;
-  Corners here_{};
-  RowSums sums_;
-  TexelIntegral result_;
+  CellTones here_{};
+  RowSums sums_{};
+  std::array<BoundaryCell, BoundarySum::kMost + 1> cells_;
+  std::size_t next_ = 0;
 };
 
 /// Within one cell the tone is bilinear: its square has degree 4 at most.
-TexelIntegral ToneLayer::integrate_in_cell(std::span<const Eigen::Vector2d> polygon, const Corners& k,
+TexelIntegral ToneLayer::integrate_in_cell(std::span<const Eigen::Vector2d> polygon, const CellTones& k,
                                            const Eigen::Vector2d& origin) {
   TexelIntegral sum;
+  const double across = k.b - k.a, up = k.c - k.a, twist = k.d - k.c - across;
   const double x0 = polygon[0].x() - origin.x(), y0 = polygon[0].y() - origin.y();
   for (std::size_t i = 2; i < polygon.size(); ++i) {
     const std::array<double, 3> x{x0, polygon[i - 1].x() - origin.x(), polygon[i].x() - origin.x()};
@@ -219,13 +225,12 @@ TexelIntegral ToneLayer::integrate_in_cell(std::span<const Eigen::Vector2d> poly
       for (std::size_t c = 0; c < 3; ++c) {
         const double s = orbit.twice * x_sum + (orbit.alone - orbit.twice) * x[c];
         const double t = orbit.twice * y_sum + (orbit.alone - orbit.twice) * y[c];
-        const double tone = k.level(t) + s * k.slope(t), weighted = orbit.weight * tone;
+        const double tone = k.a + t * up + s * (across + t * twist), weighted = orbit.weight * tone;
         mass += weighted;
         x_mass += weighted * s;
         y_mass += weighted * t;
         square += weighted * tone;
       }
-    sum.area += area;
     sum.mass += area * mass;
     sum.first += area * Eigen::Vector2d(x_mass, y_mass);
     sum.square += area * square;
@@ -286,15 +291,21 @@ ToneLayer::RowPrefix ToneLayer::repeated_prefix(int row, std::int64_t column) co
 }
 
 double ToneLayer::at(const Eigen::Vector2d& point, TexelAddressing addressing) const {
+  const auto between = [](double s, double t, const float* lower, const float* upper, Index left, Index right) {
+    return (1 - t) * ((1 - s) * lower[left] + s * lower[right]) + t * ((1 - s) * upper[left] + s * upper[right]);
+  };
+  if (point.x() >= 0 && point.y() >= 0 && point.x() < width_ - 1 && point.y() < height_ - 1) {
+    const auto column = static_cast<Index>(point.x()), row = static_cast<Index>(point.y());
+    const float* lower = tones_.data() + row * width_;
+    return between(point.x() - static_cast<double>(column), point.y() - static_cast<double>(row), lower, lower + width_,
+                   column, column + 1);
+  }
   const Index column = column_of(point.x(), 0, width_, addressing.repeat_x);
   const Index row = column_of(point.y(), 0, height_, addressing.repeat_y);
-  const Index left = texel_index(column, width_, addressing.repeat_x);
-  const Index right = texel_index(column + 1, width_, addressing.repeat_x);
-  const float* lower = tones_.data() + texel_index(row, height_, addressing.repeat_y) * width_;
-  const float* upper = tones_.data() + texel_index(row + 1, height_, addressing.repeat_y) * width_;
-  const double s = std::clamp(point.x() - static_cast<double>(column), 0., 1.);
-  const double t = std::clamp(point.y() - static_cast<double>(row), 0., 1.);
-  return (1 - t) * ((1 - s) * lower[left] + s * lower[right]) + t * ((1 - s) * upper[left] + s * upper[right]);
+  return between(std::clamp(point.x() - static_cast<double>(column), 0., 1.),
+                 std::clamp(point.y() - static_cast<double>(row), 0., 1.), this->row(row, addressing),
+                 this->row(row + 1, addressing), texel_index(column, width_, addressing.repeat_x),
+                 texel_index(column + 1, width_, addressing.repeat_x));
 }
 
 TexelIntegral ToneLayer::integrate(std::span<const Eigen::Vector2d> polygon, TexelAddressing addressing) const {
@@ -304,24 +315,41 @@ TexelIntegral ToneLayer::integrate(std::span<const Eigen::Vector2d> polygon, Tex
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  const Index column = column_of(low.x(), 0, width_, addressing.repeat_x);
-  const Index y0 = column_of(low.y(), 0, height_, addressing.repeat_y);
-  const bool is_inside = column >= 0 && y0 >= 0 && column + 1 < width_ && y0 + 1 < height_;
-  if (is_inside && high.x() <= static_cast<double>(column + 1) && high.y() <= static_cast<double>(y0 + 1)) {
-    const float* lower = tones_.data() + y0 * width_ + column;
-    const float* upper = lower + width_;
-    return integrate_in_cell(polygon, {lower[0], lower[1], upper[0], upper[1]},
-                             {static_cast<double>(column), static_cast<double>(y0)});
+  const auto sum_along = [&](auto& cells, Index x0, Index y0) {
+    // Sums start at the polygon, so that tiny polygons lose no digits.
+    const Eigen::Vector2d origin(static_cast<double>(x0), static_cast<double>(y0));
+    BoundarySum sum;
+    Eigen::Vector2d p = polygon.back() - origin;
+    for (const Eigen::Vector2d& corner : polygon) {
+      const Eigen::Vector2d q = corner - origin;
+      add_edge(p, q, cells, sum);
+      p = q;
+    }
+    TexelIntegral result = sum.total();
+    result.first += result.mass * origin;
+    return result;
+  };
+  if (low.minCoeff() > -kFar && high.maxCoeff() < kFar) {
+    const Index x0 = floor_index(low.x()), y0 = floor_index(low.y());
+    const Index columns = floor_index(high.x()) - x0 + 1, rows = floor_index(high.y()) - y0 + 1;
+    if (columns * rows == 1) {
+      const float* lower = row(y0, addressing);
+      const float* upper = row(y0 + 1, addressing);
+      const Index left = texel_index(x0, width_, addressing.repeat_x);
+      const Index right = texel_index(x0 + 1, width_, addressing.repeat_x);
+      return integrate_in_cell(polygon, {lower[left], lower[right], upper[left], upper[right]},
+                               {static_cast<double>(x0), static_cast<double>(y0)});
+    }
+    if (columns * rows <= WindowCells::kMostCells) {
+      WindowCells cells(*this, addressing, x0, y0, columns, rows);
+      return sum_along(cells, x0, y0);
+    }
   }
-  // Sums start at the polygon, so that tiny polygons lose no digits.
+  const Index column = column_of(low.x(), 0, width_, addressing.repeat_x);
   const Index x0 = addressing.repeat_x ? column : std::max<Index>(column, 0);
-  const Eigen::Vector2d origin(static_cast<double>(x0), static_cast<double>(y0));
-  BoundaryWalk walk(*this, addressing, x0, y0);
-  for (std::size_t i = 0; i < polygon.size(); ++i)
-    walk.add_edge(polygon[i] - origin, polygon[i + 1 == polygon.size() ? 0 : i + 1] - origin);
-  TexelIntegral result = walk.result();
-  result.first += result.mass * origin;
-  return result;
+  const Index y0 = column_of(low.y(), 0, height_, addressing.repeat_y);
+  WalkedCells cells(*this, addressing, x0, y0);
+  return sum_along(cells, x0, y0);
 }
 
 const float* ToneLayer::row(std::int64_t row, TexelAddressing addressing) const {

@@ -4,23 +4,12 @@
 #include <span>
 #include <vector>
 
+#include "sampling/tone/texel_addressing.h"
+#include "sampling/tone/texel_integral.h"
+
 /// A tone picture that can be looked up at a point and integrated exactly over a polygon, both with the same bilinear
 /// interpolation and the same addressing. Coordinates are texels: texel (i, j) has its centre at (i, j).
 namespace hilbrush {
-
-struct TexelAddressing {
-  bool repeat_x = true, repeat_y = true;  ///< else the border texels go on for ever
-
-  bool operator==(const TexelAddressing&) const = default;
-};
-
-/// Integrals over a polygon in texel coordinates; signed: negative if the polygon runs clockwise.
-struct TexelIntegral {
-  double area = 0;
-  double mass = 0;                                  ///< of the tone
-  Eigen::Vector2d first = Eigen::Vector2d::Zero();  ///< of tone times (x, y)
-  double square = 0;                                ///< of the tone squared
-};
 
 class ToneLayer {
  public:
@@ -38,10 +27,10 @@ class ToneLayer {
   TexelIntegral integrate(std::span<const Eigen::Vector2d> polygon, TexelAddressing addressing) const;
 
  private:
-  class BoundaryWalk;
-  struct Corners;
+  class WindowCells;
+  class WalkedCells;
 
-  static TexelIntegral integrate_in_cell(std::span<const Eigen::Vector2d> polygon, const Corners& corners,
+  static TexelIntegral integrate_in_cell(std::span<const Eigen::Vector2d> polygon, const CellTones& tones,
                                          const Eigen::Vector2d& origin);
   const float* row(std::int64_t row, TexelAddressing addressing) const;
 

@@ -18,20 +18,18 @@ inline constexpr std::size_t kMostPolygonCorners = 24;
 template <class TexelValue>
 double look_up(int width, int height, const Eigen::Vector2d& point, TexelAddressing addressing,
                TexelValue texel_value) {
-  const auto index = [](double i, int size, bool repeats) {
-    if (i >= 0 && i < size) return static_cast<std::size_t>(i);
-    const double wrapped = repeats ? i - std::floor(i / size) * size : i;
-    return static_cast<std::size_t>(std::clamp(wrapped, 0., size - 1.));
-  };
-  const double x = std::floor(point.x()), y = std::floor(point.y());
-  const double s = point.x() - x, t = point.y() - y;
+  constexpr double kFar = 1e15;  // no texture has a texel beyond, and no index overflows
+  const double u = std::clamp(point.x(), -kFar, kFar), v = std::clamp(point.y(), -kFar, kFar);
+  const std::int64_t x = floor_index(u), y = floor_index(v);
+  const double s = u - static_cast<double>(x), t = v - static_cast<double>(y);
   double sum = 0;
   for (int dy = 0; dy < 2; ++dy)
     for (int dx = 0; dx < 2; ++dx) {
       const double weight = (dx ? s : 1 - s) * (dy ? t : 1 - t);
       if (weight == 0) continue;
-      sum += weight * texel_value(index(y + dy, height, addressing.repeat_y) * static_cast<std::size_t>(width) +
-                                  index(x + dx, width, addressing.repeat_x));
+      const std::int64_t row = texel_index(y + dy, height, addressing.repeat_y);
+      sum +=
+          weight * texel_value(static_cast<std::size_t>(row * width + texel_index(x + dx, width, addressing.repeat_x)));
     }
   return sum;
 }

@@ -23,6 +23,11 @@ double TriangleTone::asked(const Vector2d& b) const {
   return field_->asked({triangle_, {1 - b.x() - b.y(), b.x(), b.y()}});
 }
 
+double TriangleTone::wanted(const Vector2d& b) const {
+  if (is_wanted_asked_) return asked(b);
+  return field_->wanted({triangle_, {1 - b.x() - b.y(), b.x(), b.y()}});
+}
+
 ToneIntegral TriangleTone::integrate(std::span<const Vector2d> polygon) const {
   switch (kind_) {
     case kTexels:
@@ -48,11 +53,10 @@ ToneIntegral TriangleTone::integrate_texels(std::span<const Vector2d> polygon) c
   if (twice_area_b == 0) return result;
   const TexelIntegral t = layer_->integrate({texels.data(), polygon.size()}, addressing_);
   // From texels to space; the sign takes care of clockwise polygons and mirrored textures.
-  const double determinant = cross(e1_, e2_);
-  const double scale = (twice_area_b > 0 ? space_ : -space_) / determinant;
+  const double scale = (twice_area_b > 0 ? space_ : -space_) * per_determinant_;
   const Vector2d first = t.first - t.mass * origin_;
   result.mass = std::max(0., scale * t.mass);
-  result.first = scale / determinant * Vector2d(cross(first, e2_), cross(e1_, first));
+  result.first = scale * per_determinant_ * Vector2d(cross(first, e2_), cross(e1_, first));
   result.square = std::max(0., scale * t.square);
   return result;
 }

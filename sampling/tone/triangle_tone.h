@@ -26,6 +26,8 @@ class TriangleTone {
 
   /// At second and third barycentric coordinate.
   double asked(const Eigen::Vector2d& b) const;
+  /// The wanted tone there.
+  double wanted(const Eigen::Vector2d& b) const;
 
   /// Exact (but for rounding) over a convex polygon; its corners by second and third barycentric coordinate, in either
   /// sense of rotation. Thread-safe.
@@ -47,12 +49,14 @@ class TriangleTone {
   std::uint32_t triangle_ = 0;
   const ToneField* field_ = nullptr;
   double space_ = 0;
-  double tone_ = 0;  ///< of kConstant
+  bool is_wanted_asked_ = false;  ///< what is asked for is what is wanted
+  double tone_ = 0;               ///< of kConstant
   // Of kTexels:
   const ToneLayer* layer_ = nullptr;
   TexelAddressing addressing_;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();                             ///< texel of corner 0
   Eigen::Vector2d e1_ = Eigen::Vector2d::Zero(), e2_ = Eigen::Vector2d::Zero();  ///< to corners 1 and 2
+  double per_determinant_ = 0;                                                   ///< of e1_ and e2_
 };
 
 }  // namespace hilbrush

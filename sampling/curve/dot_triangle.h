@@ -1,0 +1,51 @@
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "sampling/curve/surface_curve.h"
+
+/// Dots at places of triangles.
+namespace hilbrush {
+
+/// What the dots of one triangle take from it, made ready for many.
+class DotTriangle {
+ public:
+  DotTriangle() = default;
+  DotTriangle(const SurfaceCurve::Implementation& curve, const ToneField& tone, std::uint32_t triangle);
+
+  std::uint32_t triangle() const { return triangle_; }
+  /// The asked tone.
+  double asked(const Eigen::Vector3d& barycentric) const { return tone_.asked({barycentric[1], barycentric[2]}); }
+  /// The dot there, moved a hair inside the triangle.
+  Dot dot_at(const Eigen::Vector3d& barycentric, std::uint32_t component) const;
+
+ private:
+  std::uint32_t triangle_ = kNoTriangle;
+  std::array<Eigen::Vector3d, 3> corners_O_;
+  DotSurface surface_;
+  TriangleTone tone_;
+};
+
+/// Keeps the triangles met last. What it returns depends on its argument alone.
+class DotTriangles {
+ public:
+  DotTriangles(const SurfaceCurve::Implementation& curve, const ToneField& tone) : curve_(curve), tone_(tone) {}
+
+  /// Valid until the next call.
+  const DotTriangle& operator[](std::uint32_t triangle) {
+    DotTriangle& slot = slots_[triangle % slots_.size()];
+    if (slot.triangle() != triangle) slot = DotTriangle(curve_, tone_, triangle);
+    return slot;
+  }
+
+ private:
+  const SurfaceCurve::Implementation& curve_;
+  const ToneField& tone_;
+  std::array<DotTriangle, 128> slots_;
+};
+
+/// The dot at a surface point, moved a hair inside its triangle.
+Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& point,
+             std::uint32_t component);
+
+}  // namespace hilbrush
