@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kWidest = 8 * kDegree;  // that the tool turns away from the station's yaw
-constexpr int kFinePerCoarse = 2;
+constexpr int kFinePerCoarse = 4;
 constexpr int kMostToOneSide = 127;   // what back-pointers of a byte tell apart
 constexpr std::size_t kBlock = 8192;  // dots whose yaws are chosen together
 constexpr float kNever = std::numeric_limits<float>::infinity();
@@ -42,9 +42,8 @@ class YawPath {
 
   /// First roughly, as far as the tool may turn; then in small steps around that.
   void improve() {
-    // A row's steps turn the tool by less than J4 could alone, because J1 and J2 turn it, too.
-    const double coarse = one_tick_turn() / 2, fine = coarse / kFinePerCoarse;
-    const YawGrid coarse_grid{coarse, std::min(kMostToOneSide, static_cast<int>(kWidest / coarse)), 6};
+    const double coarse = one_tick_turn(), fine = coarse / kFinePerCoarse;
+    const YawGrid coarse_grid{coarse, std::min(kMostToOneSide, static_cast<int>(kWidest / coarse)), 4};
     const YawGrid fine_grid{fine, 12, 8};
     for (std::size_t i = 0; i < tour_.size(); ++i) clear_.push_back({clear_turn(i, -1), clear_turn(i, 1)});
     choose(coarse_grid);
