@@ -120,10 +120,12 @@ class SurfaceQuality {
   /// Expected share of dots within a ball.
   double share_in_ball(const Eigen::Vector3d& centre_O, double radius_m) const;
 
-  /// Neighbours and holes: straight distances to dots where the surface does not face the other way (mean normals over
-  /// a quarter of a dot's area, less than 120 degrees apart), so that the two sides of a thin wall are not neighbours.
+  /// Neighbours and holes lie on the surface: a dot is as far as the radius at which a ball around the place holds a
+  /// way along the surface to it. That is the straight distance, over folds and bumps too, but to the far side of a
+  /// thin wall it is that around the rim. An empty disc is what of such a ball hangs together with its centre.
   Spacing spacing(std::span<const Dot> dots) const;
-  /// Exact to 1e-3 of itself by branch and bound where the tone is constant; under a texture to 1/8 of a pitch.
+  /// Radius of the largest empty disc. Exact to 1e-3 of itself by branch and bound where the tone is constant; under a
+  /// texture to 1/8 of a pitch.
   double largest_hole(std::span<const Dot> dots) const;
   /// Over sqrt(N M), with M = mass_m2().
   double path_constant(std::span<const Dot> dots) const;

@@ -47,12 +47,21 @@ class PointTree {
     return entries_.empty() ? 0 : count_below(shape, 0, 0, entries_.size());
   }
 
-  /// The nearest point that `accept(index)` lets through, among those closer than `within`.
+  /// The nearest point that `accept(index)` lets through.
   template <class Accept>
-  Nearest nearest(const Point& place, Accept&& accept, double within = std::numeric_limits<double>::infinity()) const {
-    Nearest best{kNone, within * within};
-    if (!entries_.empty()) search(place, accept, 0, 0, entries_.size(), best);
-    best.distance = best.index == kNone ? std::numeric_limits<double>::infinity() : std::sqrt(best.distance);
+  Nearest nearest(const Point& place, Accept&& accept) const {
+    return cheapest(place, [&accept](std::uint32_t index, double distance2, double) {
+      return accept(index) ? distance2 : std::numeric_limits<double>::infinity();
+    });
+  }
+
+  /// The point of the least cost2(index, squared distance, least so far), which is no less than the squared distance;
+  /// asked only of points nearer than the least so far. The root of the cost is returned as the distance.
+  template <class Cost>
+  Nearest cheapest(const Point& place, Cost&& cost2) const {
+    Nearest best;
+    if (!entries_.empty()) search(place, cost2, 0, 0, entries_.size(), best);
+    best.distance = std::sqrt(best.distance);
     return best;
   }
 
@@ -119,13 +128,15 @@ class PointTree {
   }
 
   /// `best.distance` is squared meanwhile.
-  template <class Accept>
-  void search(const Point& place, Accept& accept, std::size_t node, std::size_t begin, std::size_t end,
+  template <class Cost>
+  void search(const Point& place, Cost& cost2, std::size_t node, std::size_t begin, std::size_t end,
               Nearest& best) const {
     if (is_leaf(node)) {
       for (std::size_t i = begin; i < end; ++i) {
         const double distance = (entries_[i].place - place).squaredNorm();
-        if (distance < best.distance && accept(entries_[i].index)) best = {entries_[i].index, distance};
+        if (!(distance < best.distance)) continue;
+        const double cost = cost2(entries_[i].index, distance, best.distance);
+        if (cost < best.distance) best = {entries_[i].index, cost};
       }
       return;
     }
@@ -136,7 +147,7 @@ class PointTree {
     const std::size_t first = far[1] < far[0] ? 1 : 0;
     for (const std::size_t side : {first, 1 - first}) {
       if (!(far[side] < best.distance)) continue;
-      search(place, accept, 2 * node + 1 + side, side == 0 ? begin : middle, side == 0 ? middle : end, best);
+      search(place, cost2, 2 * node + 1 + side, side == 0 ? begin : middle, side == 0 ? middle : end, best);
     }
   }
 

@@ -11,17 +11,14 @@
 #include "sampling/check.h"
 #include "sampling/input_error.h"
 #include "sampling/nearest_in_triangle.h"
+#include "sampling/quality/dots_on_surface.h"
 #include "sampling/quality/holes.h"
-#include "sampling/quality/point_tree.h"
 #include "sampling/quality/spacing.h"
 
 namespace hilbrush {
 namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
-
-/// Cosine between normals below which two places are on two sides of a wall, and not on two sides of a crease.
-constexpr double kOpposite = -.5;
 
 /// Mass of each triangle, and whether it lies evenly on it.
 std::vector<double> measure_masses(const TexturedMesh& mesh, const ToneField* tone,
@@ -94,12 +91,6 @@ std::vector<Vector2d> polygon_like_disc(double radius) {
   return polygon;
 }
 
-PointTree<3> tree_of(std::span<const Dot> dots) {
-  std::vector<Vector3d> places(dots.size());
-  for (std::size_t i = 0; i < dots.size(); ++i) places[i] = dots[i].position_O;
-  return PointTree<3>(places);
-}
-
 }  // namespace
 
 double disc_triangle_area(double radius, const Vector2d& a, const Vector2d& b, const Vector2d& c) {
@@ -152,27 +143,6 @@ SurfacePoint SurfaceQuality::Implementation::random_point(double which, double u
   return {triangle, {1 - root, root * (1 - v), root * v}};
 }
 
-std::vector<Vector3d> SurfaceQuality::Implementation::facing_normals(double area) const {
-  constexpr std::size_t kMost = 64;
-  std::vector<Vector3d> normals(mesh.triangle_count());
-  tbb::parallel_for(std::size_t{0}, normals.size(), [&](std::size_t t) {
-    std::vector<std::uint32_t> around{static_cast<std::uint32_t>(t)};
-    Vector3d sum = Vector3d::Zero();
-    double covered = 0;
-    for (std::size_t i = 0; i < around.size() && covered < area; ++i) {
-      const Vector3d vector = mesh.area_vector(around[i]);
-      sum += vector;
-      covered += vector.norm();
-      for (const TriangleSide& side : neighbours[around[i]])
-        if (side.triangle != kNoTriangle && around.size() < kMost &&
-            std::find(around.begin(), around.end(), side.triangle) == around.end())
-          around.push_back(side.triangle);
-    }
-    normals[t] = sum.normalized();
-  });
-  return normals;
-}
-
 double SurfaceQuality::Implementation::density_at(const Vector3d& place, std::uint32_t triangle) const {
   if (!tone) return 1;
   return tone->asked({triangle, nearest_in_triangle(place, mesh.corner(triangle, 0), mesh.corner(triangle, 1),
@@ -203,18 +173,15 @@ double SurfaceQuality::share_in_ball(const Vector3d& centre_O, double radius_m) 
 
 Spacing SurfaceQuality::spacing(std::span<const Dot> dots) const {
   const Implementation& surface = *implementation_;
-  const PointTree<3> tree = tree_of(dots);
+  const DotsOnSurface on_surface(surface.mesh, surface.neighbours, dots);
   const double densest =
       densest_packing_distance(surface.mass / static_cast<double>(std::max<std::size_t>(dots.size(), 1)));
-  const std::vector<Vector3d> facing =
-      surface.facing_normals(surface.mass / static_cast<double>(std::max<std::size_t>(dots.size(), 1)) / 4);
   std::vector<double> distances(dots.size());
   tbb::parallel_for(std::size_t{0}, dots.size(), [&](std::size_t i) {
-    const auto is_beside = [&](std::uint32_t other) {
-      return other != i && facing[dots[other].triangle].dot(facing[dots[i].triangle]) > kOpposite;
-    };
-    const double density = surface.density_at(dots[i].position_O, dots[i].triangle);
-    distances[i] = tree.nearest(dots[i].position_O, is_beside).distance / densest * std::sqrt(density);
+    const Dot& dot = dots[i];
+    const double density = surface.density_at(dot.position_O, dot.triangle);
+    distances[i] =
+        on_surface.distance(dot.position_O, dot.triangle, static_cast<std::uint32_t>(i)) / densest * std::sqrt(density);
   });
   return spacing_figures(std::move(distances));
 }
@@ -222,20 +189,15 @@ Spacing SurfaceQuality::spacing(std::span<const Dot> dots) const {
 double SurfaceQuality::largest_hole(std::span<const Dot> dots) const {
   CHECK(!dots.empty());
   const Implementation& surface = *implementation_;
-  const PointTree<3> tree = tree_of(dots);
+  const DotsOnSurface on_surface(surface.mesh, surface.neighbours, dots);
   const double pitch = std::sqrt(surface.mass / static_cast<double>(dots.size()));
-  const std::vector<Vector3d> facing = surface.facing_normals(pitch * pitch / 4);
   std::vector<SearchTriangle> triangles;
   for (std::uint32_t t = 0; t < surface.mesh.triangle_count(); ++t)
     if (surface.masses[t] > 0)
       triangles.push_back({{surface.mesh.corner(t, 0), surface.mesh.corner(t, 1), surface.mesh.corner(t, 2)}, t});
   const auto distance = [&](const Vector3d& place, std::uint32_t face) {
     const double density = surface.density_at(place, face);
-    if (!(density > 0)) return 0.;
-    const auto faces_alike = [&](std::uint32_t i) { return facing[dots[i].triangle].dot(facing[face]) > kOpposite; };
-    double nearest = tree.nearest(place, faces_alike).distance;
-    if (!std::isfinite(nearest)) nearest = tree.nearest(place, [](std::uint32_t) { return true; }).distance;
-    return nearest * std::sqrt(density);
+    return density > 0 ? on_surface.distance(place, face) * std::sqrt(density) : 0;
   };
   SearchLimits limits;
   if (surface.tone) limits.smallest_m = pitch / 8;

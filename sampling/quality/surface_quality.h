@@ -28,9 +28,6 @@ struct SurfaceQuality::Implementation {
   SurfacePoint random_point(double which, double u, double v) const;
   /// Asked density, 1 where tone doesn't matter.
   double density(const SurfacePoint& point) const { return tone ? tone->asked(point) : 1; }
-  /// Which way the surface faces around each triangle: the mean normal of the triangles next to it that make up `area`
-  /// (64 at most), so that wrinkles finer than that do not count.
-  std::vector<Eigen::Vector3d> facing_normals(double area) const;
   double density_at(const Eigen::Vector3d& place, std::uint32_t triangle) const;
 };
 

@@ -59,6 +59,15 @@ inline TexturedMesh rectangle(double width_m, double height_m, int nu, int nv) {
   return grid(nu, nv, [=](double u, double v) { return Eigen::Vector3d(u * width_m, v * height_m, 0); });
 }
 
+/// A sheet 2 by 1 sides large, folded along its middle, the y axis: `angle` between its halves, the lower one on z = 0.
+inline TexturedMesh folded_sheet(double side_m, double angle, int nu, int nv) {
+  return grid(2 * nu, nv, [=](double u, double v) {
+    const double along = (2 * u - 1) * side_m, y = v * side_m;
+    return along < 0 ? Eigen::Vector3d(-along, y, 0)
+                     : Eigen::Vector3d(along * std::cos(angle), y, along * std::sin(angle));
+  });
+}
+
 inline TexturedMesh sphere(double radius_m, int nu = 48, int nv = 24) {
   TexturedMesh mesh;
   mesh.vertices.emplace_back(0, 0, -radius_m);

@@ -144,6 +144,23 @@ TEST(SurfaceQuality, TheTwoSidesOfAThinPlateAreApart) {
   EXPECT_GT(quality.largest_hole(dots) / std::sqrt(static_cast<double>(dots.size())), 1.5 * both_sides / 4);
 }
 
+TEST(SurfaceQuality, ADotBeyondASharpFoldIsNear) {
+  // One dot 5 mm from a fold of 6 degrees: the empty disc around a place on the other side reaches to it over the fold.
+  const double side = .04, angle = .1;
+  const TexturedMesh mesh = test::folded_sheet(side, angle, 8, 8);
+  const SurfaceQuality quality(mesh);
+  std::vector<Dot> dots{test::dot_at(mesh, quality.nearest({.005, side / 2, 0}))};
+  const double far_corner = Vector3d(side * std::cos(angle) - .005, side / 2, side * std::sin(angle)).norm();
+  const double pitch = std::sqrt(2 * side * side);
+  // From the far corners of both halves the ball reaches the fold only where it is as far as the dot is, or farther.
+  EXPECT_NEAR(quality.largest_hole(dots) * pitch, std::max(far_corner, std::hypot(side, 0)), 1e-3 * side);
+  // Facing dots 2 and 5 mm from the fold are as far apart as the farther one is from the fold.
+  dots.push_back(test::dot_at(mesh, quality.nearest({.002 * std::cos(angle), side / 2, .002 * std::sin(angle)})));
+  const double densest = std::sqrt(2 / std::numbers::sqrt3 * mesh.area_m2() / 2);
+  const Spacing spacing = quality.spacing(dots);
+  EXPECT_NEAR(spacing.distances.back() * densest, .005, 1e-6);
+}
+
 TEST(SurfaceQuality, HolesOfRandomDotsOnASphereAreThoseOfDirections) {
   const double r = .025;
   const TexturedMesh mesh = test::sphere(r, 200, 100);
