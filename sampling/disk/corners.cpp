@@ -16,6 +16,9 @@ constexpr double kLeastSideShare = .005;
 /// Of more forks than these none is tried as a corner.
 constexpr std::size_t kMostForks = 16;
 
+/// A slit's corners, as a share of the loop from its tips: where tan(x) = (sqrt(2) - 1)^2 for a quarter turn x a half.
+const double kSlitCorner = std::atan(3 - 2 * std::numbers::sqrt2) / std::numbers::pi;
+
 /// Adds the place nearest to the middle of the longest stretch between two corners.
 void add_middle_of_longest(std::vector<std::size_t>& corners, const std::vector<double>& along) {
   const std::size_t n = along.size() - 1;
@@ -54,11 +57,12 @@ std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<do
   return corners;
 }
 
-Corners corners_by_length(const std::vector<double>& along) {
+/// Nearest to shares of the loop's length.
+Corners corners_at(const std::array<double, 4>& shares, const std::vector<double>& along) {
   const std::size_t n = along.size() - 1;
   Corners corners{};
   for (std::size_t k = 0; k < 4; ++k) {
-    const double wanted = (static_cast<double>(k) + .5) / 4 * along.back();
+    const double wanted = shares[k] * along.back();
     const auto above = static_cast<std::size_t>(std::lower_bound(along.begin(), along.end(), wanted) - along.begin());
     const std::size_t nearest = above > 0 && wanted - along[above - 1] < along[above] - wanted ? above - 1 : above;
     corners[k] = std::min(std::max(nearest, k == 0 ? 0 : corners[k - 1] + 1), n - 4 + k);
@@ -88,6 +92,46 @@ std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<do
   return best;
 }
 
+/// Where a place of a slit's loop comes to lie on the rim of the half plane, if the surface is a sphere and the slit
+/// goes from pole to pole; corners at +-(sqrt(2) - 1) and +-(sqrt(2) + 1), the loop's start at 0.
+double on_half_plane(double share) {
+  const double root = std::sqrt(std::tan(std::numbers::pi * std::min(share, 1 - share)));
+  return share < .5 ? root : -root;
+}
+
+/// Shares of a side of the square, 0 to 1, for the part of the rim from sqrt(2) - 1 to sqrt(2) + 1: the lemniscate's
+/// arc.
+double along_square(double x) {
+  const double p = std::clamp(.5 * (x - 1 / x), -1., 1.);
+  const double arc = std::ellint_1(std::numbers::sqrt2 / 2, std::asin(std::abs(p) * std::sqrt(2 / (1 + p * p))));
+  return .5 * (1 + std::copysign(arc / std::comp_ellint_1(std::numbers::sqrt2 / 2), p));
+}
+
+/// Sides of the square up to a place of a slit's loop, from the loop's start in the middle of a side: 0 to 4.
+double along_slit(double share) {
+  constexpr double kLow = std::numbers::sqrt2 - 1, kHigh = std::numbers::sqrt2 + 1;
+  const double x = on_half_plane(share);
+  // A quarter turn of the square takes x to (1 + x) / (1 - x).
+  if (x >= kLow && x <= kHigh) return .5 + along_square(x);
+  if (x <= -kLow && x >= -kHigh) return 2.5 + along_square(-1 / x);
+  if (std::abs(x) > kHigh) return 1.5 + along_square((x - 1) / (x + 1));
+  return (x < 0 ? 4 : 0) - .5 + along_square((1 + x) / (1 - x));
+}
+
+/// How far along the long sides of a rectangle its corners must go towards their middles (back around the ends if
+/// negative, in shares of the side they are on), for it to become a whole number of squares. Each end is taken for that
+/// of a half strip, which cosh(pi z) maps to a half plane.
+double shift_for_whole_squares(double length) {
+  constexpr double kPi = std::numbers::pi;
+  const double below = std::floor(length), whole = length * length < below * (below + 1) ? below : below + 1;
+  const double c = std::exp(.5 * kPi * (length - whole));
+  return c > 1 ? std::acosh(c) / (kPi * length) : -std::acos(c) / kPi;
+}
+
+bool is_slit(const CutDisk& cut) {
+  return cut.is_cut && cut.forks.empty();
+}
+
 }  // namespace
 
 std::vector<double> lengths_along(const CutDisk& cut) {
@@ -105,12 +149,30 @@ std::array<double, 4> side_lengths(const Corners& corners, const std::vector<dou
   return sides;
 }
 
+std::vector<double> boundary_measure(const CutDisk& cut, const std::vector<double>& along) {
+  std::vector<double> measure = along;
+  if (!is_slit(cut)) return measure;
+  for (double& place : measure) place = along_slit(std::min(place / along.back(), 1.));
+  measure.front() = 0, measure.back() = 4;
+  return measure;
+}
+
 Corners choose_corners(const CutDisk& cut, const std::vector<double>& along) {
+  if (is_slit(cut)) return corners_at({kSlitCorner, .5 - kSlitCorner, .5 + kSlitCorner, 1 - kSlitCorner}, along);
   const auto natural = cut.is_cut ? corners_at_forks(cut, along) : corners_of_shape(cut, along);
-  if (!natural) return corners_by_length(along);
+  if (!natural) return corners_at({.125, .375, .625, .875}, along);
   const Corners& c = *natural;
   const auto s = side_lengths(c, along);
   return s[0] + s[2] >= s[1] + s[3] ? c : Corners{c[1], c[2], c[3], c[0]};
+}
+
+std::optional<Corners> corners_for_whole_squares(const CutDisk& cut, const std::vector<double>& along, double modulus) {
+  constexpr double kFits = .03;
+  if (!is_slit(cut) || std::abs(std::log(modulus / std::round(modulus))) < kFits) return std::nullopt;
+  const double shift = modulus >= 1 ? shift_for_whole_squares(modulus) : -shift_for_whole_squares(1 / modulus);
+  std::array<double, 4> shares{.5 + shift, 1.5 - shift, 2.5 + shift, 3.5 - shift};
+  for (double& share : shares) share /= 4;
+  return corners_at(shares, boundary_measure(cut, along));
 }
 
 }  // namespace hilbrush

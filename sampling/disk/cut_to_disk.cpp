@@ -220,14 +220,6 @@ std::vector<Eigen::Vector3d> forks_of(const Disk& disk, const std::vector<Triang
   return forks;
 }
 
-/// The loop of a disk, beginning at a vertex.
-BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
-  BoundaryLoop loop = std::move(boundary_loops(disk.neighbours()).front());
-  const auto first = std::find_if(loop.begin(), loop.end(), [&](TriangleSide s) { return disk.from(s) == vertex; });
-  std::rotate(loop.begin(), first, loop.end());
-  return loop;
-}
-
 void split_long_sides(CutDisk& cut) {
   const std::uint32_t start = cut.disk.from(cut.outer[0]);
   const double longest = kLongestBoundarySide * length_of(cut.disk, cut.outer);
@@ -289,6 +281,13 @@ void fill_holes(Disk& disk, std::size_t most_holes) {
 }
 
 }  // namespace
+
+BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
+  BoundaryLoop loop = std::move(boundary_loops(disk.neighbours()).front());
+  const auto first = std::find_if(loop.begin(), loop.end(), [&](TriangleSide s) { return disk.from(s) == vertex; });
+  std::rotate(loop.begin(), first, loop.end());
+  return loop;
+}
 
 std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
                                    std::string& reason, const CutOptions& options) {

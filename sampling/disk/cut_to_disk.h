@@ -17,6 +17,9 @@ struct CutDisk {
   std::vector<std::uint32_t> forks;
 };
 
+/// The one loop of a disk, beginning at a vertex of it.
+BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex);
+
 struct CutOptions {
   double area_share = 1;        ///< of the whole surface: what a component is worth refining for
   std::size_t most_holes = 32;  ///< of more boundaries all but the longest are filled: slits between them make a maze

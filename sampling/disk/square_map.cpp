@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 /// Strips are mapped onto at most so many squares in a row.
 constexpr double kMostSquares = 64;
 /// A map that lengthens the curve by more is made again with a sliding boundary.
-constexpr double kGoodLengthening = 1.03;
+constexpr double kGoodLengthening = 1.006;
 /// So many parts that the map shrinks to nothing are slit open, one after the other.
 constexpr int kMostExtensions = 6;
 /// Each of them must leave at most this share of the flipped faces.
@@ -52,7 +52,7 @@ double area_of(const Disk& disk) {
 /// Bits: a corner of the square lies on two sides.
 constexpr std::uint8_t kBottom = 1, kRight = 2, kTop = 4, kLeft = 8, kAllSides = 15;
 
-/// The boundary's places on the unit square by length, and which sides of the square a vertex lies on.
+/// The boundary's places on the unit square, and which sides of the square a vertex lies on.
 struct SquareBoundary {
   std::vector<Vector2d> places;
   std::vector<std::uint8_t> sides;
@@ -64,7 +64,8 @@ struct SquareBoundary {
   }
 };
 
-SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const std::vector<double>& along) {
+/// Between corners by `measure`, see boundary_measure().
+SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const std::vector<double>& measure) {
   const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(1, 0), Vector2d(1, 1), Vector2d(0, 1)};
   SquareBoundary boundary;
   boundary.places.assign(cut.disk.positions().size(), Vector2d(.5, .5));
@@ -72,7 +73,7 @@ SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const 
   const std::size_t n = cut.outer.size();
   for (std::size_t k = 0; k < 4; ++k) {
     const std::size_t begin = corners[k], end = corners[(k + 1) % 4] + (corners[(k + 1) % 4] <= begin ? n : 0);
-    const auto at = [&](std::size_t i) { return along[i % n] + (i >= n ? along.back() : 0); };
+    const auto at = [&](std::size_t i) { return measure[i % n] + (i >= n ? measure.back() : 0); };
     const Vector2d& from = square[k];
     const Vector2d& to = square[(k + 1) % 4];
     for (std::size_t i = begin; i <= end; ++i) {
@@ -158,26 +159,18 @@ struct MapTrial {
   std::optional<SquareMap> best;
   std::vector<std::uint32_t> flipped;  ///< vertices of the flipped faces of the last map that had any
 
-  explicit MapTrial(CutDisk& c)
-      : cut_(c),
-        along_(lengths_along(cut_)),
-        corners_(choose_corners(cut_, along_)),
-        boundary_(place_boundary(cut_, corners_, along_)) {
-    split_chords(cut_.disk, boundary_);
-    cut_.outer = boundary_loops(cut_.disk.neighbours()).front();  // splitting has moved sides about
-    graph_ = cotan_graph(cut_.disk);
-    order_ = elimination_order(graph_);
-    boundary_places_.resize(static_cast<Eigen::Index>(boundary_.places.size()), 2);
-    for (std::size_t v = 0; v < boundary_.places.size(); ++v)
-      boundary_places_.row(static_cast<Eigen::Index>(v)) = boundary_.places[v];
-    const bool has_corners = !cut_.is_cut || cut_.forks.size() >= 4;
-    square_count_ = has_corners ? squares_for(side_lengths(corners_, along_), area_of(cut_.disk)) : 1;
-  }
+  explicit MapTrial(CutDisk& c) : cut_(c), along_(lengths_along(cut_)) { set_corners(choose_corners(cut_, along_)); }
 
   void fix_boundary() {
     Eigen::MatrixXd values = boundary_places_;
-    if (solve_symmetric(graph_, order_, boundary_.on_sides(kAllSides), values))
-      take(places_of(values, square_count_, false), square_count_);
+    if (!solve_symmetric(graph_, order_, boundary_.on_sides(kAllSides), values)) return;
+    modulus_ = modulus_of(values);
+    take(places_of(values, square_count_, false), square_count_);
+  }
+
+  /// Moves corners so that a slit becomes a whole number of squares, by what the map with a fixed boundary says.
+  void fit_corners() {
+    if (const auto corners = corners_for_whole_squares(cut_, along_, modulus_)) set_corners(*corners);
   }
 
   void slide_boundary() {
@@ -185,7 +178,7 @@ struct MapTrial {
     if (!solve_symmetric(graph_, order_, boundary_.on_sides(kLeft | kRight), values.col(0)) ||
         !solve_symmetric(graph_, order_, boundary_.on_sides(kBottom | kTop), values.col(1)))
       return;
-    const double width = std::sqrt(energy(graph_, values.col(1)) / energy(graph_, values.col(0)));
+    const double width = modulus_of(values);
     const int count = static_cast<int>(std::lround(std::clamp(std::max(width, 1 / width), 1., kMostSquares)));
     take(places_of(values, count, width < 1), count);
   }
@@ -197,6 +190,25 @@ struct MapTrial {
   }
 
  private:
+  void set_corners(const Corners& corners) {
+    boundary_ = place_boundary(cut_, corners, boundary_measure(cut_, along_));
+    const bool has_corners = !cut_.is_cut || cut_.forks.size() >= 4;
+    square_count_ = has_corners ? squares_for(side_lengths(corners, along_), area_of(cut_.disk)) : 1;
+    const std::uint32_t start = cut_.disk.from(cut_.outer.front());
+    split_chords(cut_.disk, boundary_);
+    cut_.outer = loop_from(cut_.disk, start);  // splitting has moved sides about
+    graph_ = cotan_graph(cut_.disk);
+    order_ = elimination_order(graph_);
+    boundary_places_.resize(static_cast<Eigen::Index>(boundary_.places.size()), 2);
+    for (std::size_t v = 0; v < boundary_.places.size(); ++v)
+      boundary_places_.row(static_cast<Eigen::Index>(v)) = boundary_.places[v];
+  }
+
+  /// Width over height of the rectangle that the map would like to fill.
+  double modulus_of(const Eigen::MatrixXd& values) const {
+    return std::sqrt(energy(graph_, values.col(1)) / energy(graph_, values.col(0)));
+  }
+
   void take(std::vector<Vector2d> places, int count) {
     if (count_flipped(cut_.disk, places) > 0) {
       flipped.clear();
@@ -211,12 +223,12 @@ struct MapTrial {
 
   CutDisk& cut_;
   std::vector<double> along_;
-  Corners corners_;
   SquareBoundary boundary_;
   WeightedGraph graph_;
   std::vector<std::uint32_t> order_;
   Eigen::MatrixXd boundary_places_;  ///< a row a vertex
-  int square_count_ = 1;             ///< with the boundary_ fixed
+  int square_count_ = 1;             ///< with the boundary fixed
+  double modulus_ = 1;               ///< by the map with the boundary fixed
 };
 
 }  // namespace
@@ -233,6 +245,7 @@ std::optional<SquareMap> map_to_square(CutDisk& cut) {
     MapTrial trial(cut);
     trial.fix_boundary();
     if (trial.best && trial.best->lengthening <= kGoodLengthening) return trial.best;
+    trial.fit_corners();
     trial.slide_boundary();
     if (trial.best) return trial.best;
     // Where places differ in their last digits only, the map has shrunk a part to nothing.

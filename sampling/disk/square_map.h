@@ -16,12 +16,13 @@ struct SquareMap {
   double lengthening = 1;  ///< of a curve that runs either way as often: mean of (sqrt(shear) + 1 / sqrt(shear)) / 2
 };
 
-/// First the boundary's places are spread by length over the sides of the square, the inside by the convex combination
-/// map (Tutte 1963, Floater 1997) with clamped cotan weights: one factor. Where that is too sheared, the boundary
-/// slides: x solves with the left and right sides fixed only, y with the bottom and top, which is as conformal as the
-/// weights are, onto a rectangle of the disk's own module - the square disk orbifold of Aigerman and Lipman, "Orbifold
-/// Tutte Embeddings", 2015: mirrored at its sides the disk tiles a torus, so that positive symmetric weights give no
-/// flipped face. Where rounding does, in a finger that the map shrinks to nothing, the cut is extended into it; at last
+/// First the boundary's places are spread over the sides of the square (corners.h: a slit as if it was a sphere's), the
+/// inside by the convex combination map (Tutte 1963, Floater 1997) with clamped cotan weights: one factor. Where that
+/// is too sheared, a slit's corners are moved so that it becomes a whole number of squares, and the boundary slides: x
+/// solves with the left and right sides fixed only, y with the bottom and top, which is as conformal as the weights
+/// are, onto a rectangle of the disk's own module - the square disk orbifold of Aigerman and Lipman, "Orbifold Tutte
+/// Embeddings", 2015: mirrored at its sides the disk tiles a torus, so that positive symmetric weights give no flipped
+/// face. Where rounding does, in a finger that the map shrinks to nothing, the cut is extended into it; at last
 /// mean-value weights are tried.
 /// Splits edges of the disk that join two boundary vertices on one side of the square. Returns nothing if no map
 /// without a flipped face is found (tested exactly). Cost: a sparse Cholesky factor or three, 1 s each for 270,000

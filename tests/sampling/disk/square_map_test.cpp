@@ -81,5 +81,20 @@ TEST(SquareMap, GivesAStripItsSquaresInARow) {
   EXPECT_EQ(map->square_count, 10);
 }
 
+TEST(SquareMap, IsAllButConformalOnASlitBlob) {
+  // Whatever its length: the boundary of a sphere's slit is placed as it should be, and where that does not fit,
+  // corners are moved until the map is a whole number of squares.
+  for (const double length : {1., 1.3, 1.7, 2.2, 3.}) {
+    TexturedMesh mesh = test::sphere(.02, 96, 64);
+    for (auto& vertex : mesh.vertices) vertex.z() *= length;
+    const Neighbours neighbours = find_neighbours(mesh.triangles);
+    std::string reason;
+    auto cut = cut_to_disk(mesh, neighbours, find_components(mesh, neighbours)[0], reason);
+    const auto map = map_to_square(*cut);
+    ASSERT_TRUE(map);
+    EXPECT_LE(map->lengthening, 1.006) << length << ", squares " << map->square_count;
+  }
+}
+
 }  // namespace
 }  // namespace hilbrush
