@@ -1,14 +1,17 @@
 #include "sampling/blue.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "sampling/check.h"
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/curve/sequence.h"
+#include "sampling/growing_ball.h"
 #include "sampling/relax/colouring.h"
 #include "sampling/relax/kernel.h"
 #include "sampling/relax/stratum_places.h"
@@ -22,6 +25,12 @@ constexpr int kChoiceSweeps = 3, kNewtonSweeps = 3;
 /// Two dots nearer than this share of their spacing in the densest packing are pushed apart at last; the kernel, which
 /// is flat on top, leaves a few such pairs in 100,000.
 constexpr double kNearest = .58;
+/// A place that is farther from all dots, in spacings, draws that of its stratum: most holes of the kernel's choice lie
+/// on the border, where no neighbour is on the other side to be pushed back by.
+constexpr double kFarthest = .78;
+constexpr int kEveningRounds = 3;
+/// Border within so many spacings of a place is looked at.
+constexpr double kToBorder = .4;
 /// How far Newton steps may take a dot from the place that was chosen, and a single one, in spacings.
 constexpr double kLongestWay = .25, kLongestStep = .15;
 /// Dots whose spacings differ by more do not see each other: what they would push, the surface around them would pull.
@@ -39,16 +48,27 @@ double reach_of(const PlacedStratum& stratum) {
   return stratum.radius_m + kMostReach * stratum.spacing_m;
 }
 
-IndexLists find_neighbours(const std::vector<PlacedStratum>& strata) {
+/// Strata see each other if they face the same way, or hang together over a fold; not through a wall.
+IndexLists find_neighbours(const SurfaceCurve& curve, const PlacedStrata& strata) {
   std::vector<Ball> balls;
-  balls.reserve(strata.size());
-  for (const PlacedStratum& stratum : strata) balls.push_back({stratum.middle_O, reach_of(stratum)});
+  balls.reserve(strata.strata.size());
+  for (const PlacedStratum& stratum : strata.strata) balls.push_back({stratum.middle_O, reach_of(stratum)});
+  tbb::enumerable_thread_specific<GrowingBall> growing_balls(
+      [&] { return GrowingBall(curve.mesh(), curve.implementation().neighbours); });
+  const auto first_place = [&](std::uint32_t i) -> const SurfacePlace& {
+    return strata.place(i, static_cast<std::size_t>(std::countr_zero(strata.strata[i].open_places)));
+  };
   return find_touching_balls(balls, [&](std::uint32_t i, std::uint32_t j) {
-    const PlacedStratum &a = strata[i], &b = strata[j];
+    const PlacedStratum &a = strata.strata[i], &b = strata.strata[j];
     const double ratio = a.spacing_m / b.spacing_m;
-    if (!(ratio < kMostUnequal && ratio * kMostUnequal > 1 && a.normal_O.dot(b.normal_O) > 0)) return false;
+    if (!(ratio < kMostUnequal && ratio * kMostUnequal > 1)) return false;
     const double reach = std::sqrt(PairKernel(a.spacing_m, b.spacing_m).support2()) + a.radius_m + b.radius_m;
-    return (a.middle_O - b.middle_O).squaredNorm() < reach * reach;
+    if (!((a.middle_O - b.middle_O).squaredNorm() < reach * reach)) return false;
+    if (a.normal_O.dot(b.normal_O) > 0) return true;
+    const SurfacePlace& from = first_place(std::min(i, j));
+    GrowingBall& ball = growing_balls.local();
+    ball.begin(from.position_O, from.triangle);
+    return std::isfinite(ball.entry2(first_place(std::max(i, j)).triangle, reach * reach));
   });
 }
 
@@ -58,7 +78,7 @@ class Relaxation {
       : curve_(curve),
         tone_(tone),
         strata_(strata),
-        neighbours_(find_neighbours(strata.strata)),
+        neighbours_(find_neighbours(curve, strata)),
         colouring_(colour_stretches(neighbours_)),
         pulls_(strata.strata.size()),
         dots_(strata.strata.size()) {
@@ -66,6 +86,7 @@ class Relaxation {
       find_pulls(i);
       dots_[i] = strata_.place(i, any_open_place(i, uniform_number(seed, i)));
     });
+    find_border();
   }
 
   void choose(const Progress& progress) {
@@ -81,8 +102,11 @@ class Relaxation {
       visit_all(progress, kChoiceSweeps + sweep, [&](std::size_t i) { step(i, chosen[i].position_O); });
   }
 
-  void push_apart(const Progress& progress) {
-    visit_all(progress, kChoiceSweeps + kNewtonSweeps, [&](std::size_t i) { leave_nearest(i); });
+  void even_out(const Progress& progress) {
+    for (int round = 0; round < kEveningRounds; ++round) {
+      visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round, [&](std::size_t i) { close_hole(i); });
+      visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round + 1, [&](std::size_t i) { leave_nearest(i); });
+    }
   }
 
   const std::vector<SurfacePlace>& dots() const { return dots_; }
@@ -162,6 +186,53 @@ class Relaxation {
     move_to(dots_[i], curve_, tone_, home_O + from_home);
   }
 
+  /// Places on the border beside each stratum, where walks outwards and to both sides from its open places end.
+  void find_border() {
+    const SurfaceCurve::Implementation& curve = curve_.implementation();
+    const auto has_border = [](const auto& sides) { return std::ranges::find(sides, kNoSide) != sides.end(); };
+    border_.resize(dots_.size());
+    if (std::ranges::none_of(curve.neighbours, has_border)) return;
+    tbb::parallel_for(std::size_t{0}, dots_.size(), [&](std::size_t i) {
+      const PlacedStratum& stratum = strata_.strata[i];
+      for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
+        if (!is_open(i, p)) continue;
+        const SurfacePlace& place = strata_.place(i, p);
+        const Vector3d outwards = (place.position_O - stratum.middle_O).normalized();
+        const Vector3d across = stratum.normal_O.cross(outwards);
+        for (const Vector3d& way : {outwards, across, Vector3d(-across)}) {
+          const SurfacePoint end = walk_towards(curve.mesh, curve.neighbours, {place.triangle, {}},
+                                                place.position_O + kToBorder * stratum.spacing_m * way);
+          const bool is_on_border = has_border(curve.neighbours[end.triangle]) && end.barycentric.minCoeff() <= 0;
+          if (is_on_border) border_[i].push_back(position(curve.mesh, end));
+        }
+      }
+    });
+  }
+
+  /// The place of the stratum, and of the border beside it, that is farthest from all dots, if that is too far, draws
+  /// the stratum's own dot near enough.
+  void close_hole(std::size_t i) {
+    const double enough = kFarthest * strata_.strata[i].spacing_m;
+    const Vector3d here_O = dots_[i].position_O;
+    double worst = enough;
+    Vector3d hole_O = here_O;
+    const auto look_at = [&](const Vector3d& place_O) {
+      double nearest2 = (here_O - place_O).squaredNorm();
+      for (const std::uint32_t j : neighbours_[i]) {
+        if (nearest2 <= worst * worst) return;
+        nearest2 = std::min(nearest2, (dots_[j].position_O - place_O).squaredNorm());
+      }
+      if (nearest2 > worst * worst) worst = std::sqrt(nearest2), hole_O = place_O;
+    };
+    for (std::size_t p = 0; p < kPlacesAStratum; ++p)
+      if (is_open(i, p)) look_at(strata_.place(i, p).position_O);
+    for (const Vector3d& place_O : border_[i]) look_at(place_O);
+    if (worst > enough) {
+      const Vector3d way = hole_O - here_O;
+      move_to(dots_[i], curve_, tone_, here_O + (1 - enough / way.norm()) * way);
+    }
+  }
+
   void leave_nearest(std::size_t i) {
     const Vector3d here_O = dots_[i].position_O;
     double worst = 0;
@@ -185,7 +256,7 @@ class Relaxation {
         const std::size_t begin = stretches[s] * Colouring::kStretch;
         for (std::size_t i = begin; i < std::min(begin + Colouring::kStretch, dots_.size()); ++i) visit(i);
       });
-    if (progress) progress(.5 + .5 * (sweep + 1) / (kChoiceSweeps + kNewtonSweeps + 1));
+    if (progress) progress(.5 + .5 * (sweep + 1) / (kChoiceSweeps + kNewtonSweeps + 2 * kEveningRounds));
   }
 
   const SurfaceCurve& curve_;
@@ -194,6 +265,7 @@ class Relaxation {
   const IndexLists neighbours_;
   const Colouring colouring_;
   std::vector<std::array<Pull, kPulls>> pulls_;
+  std::vector<std::vector<Vector3d>> border_;
   std::vector<SurfacePlace> dots_;
 };
 
@@ -244,7 +316,7 @@ DotSequence place_blue(const SurfaceCurve& curve, const ToneField& tone, const S
     Relaxation relaxation(curve, tone, strata, options.seed);
     relaxation.choose(progress);
     relaxation.refine(progress);
-    relaxation.push_apart(progress);
+    relaxation.even_out(progress);
     sequence.dots = dots_at(curve, tone, relaxation.dots());
     measure_paths(sequence.dots, figures);
   }
