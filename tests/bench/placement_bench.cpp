@@ -57,7 +57,7 @@ TexturedMesh plate() {
 }
 TexturedMesh sphere() {
   return grid_mesh(90, 45, [](double u, double v) {
-    const double turn = 2 * kPi * u, polar = kPi * v;
+    const double turn = u == 1 ? 0 : 2 * kPi * u, polar = kPi * v;  // the seam's two sides are the same to the last bit
     const double r = v == 0 || v == 1 ? 0 : std::sin(polar);
     return Vector3d(r * std::cos(turn), r * std::sin(turn), -std::cos(polar));
   });
