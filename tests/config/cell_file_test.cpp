@@ -280,6 +280,12 @@ TEST(CellFile, TheShippedCellIsCalibratedForAllThatAJobCanName) {
       tone_options(cell, {.sampler = sampler, .curve = "hilbert", .levels = levels, .spot_pitches = 1.41}, warning);
       EXPECT_EQ(warning, "") << sampler << ' ' << levels;
     }
+  for (const char* sampler : {"centroid", "jittered", "even", "random", "halton", "hammersley", "sobol"})
+    for (int levels = 1; levels <= 4; ++levels) {
+      std::string warning;
+      tone_options(cell, {.sampler = sampler, .curve = "peano2", .levels = levels, .spot_pitches = 1.41}, warning);
+      EXPECT_EQ(warning, "") << sampler << " on peano2 " << levels;
+    }
   std::string warning;
   tone_options(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}, warning);
   EXPECT_EQ(warning, "");
