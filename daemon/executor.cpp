@@ -18,6 +18,11 @@ constexpr double kPulseGraceS = 0.1;  ///< the same for a pulse
 /// However fast the cell's clock runs: this host, its network and its scheduler are no faster.
 constexpr double kWallGraceS = 0.25;
 
+/// What is known of the axes must not be older than this when a pulse begins and when it is believed: on a busy machine
+/// whoever listens to a device may be kept waiting while it drifts. Several frames, or readings.
+constexpr double kSightS = 0.03;
+constexpr double kSightWallS = 0.005;
+
 constexpr double kReadingWallS = 2;  ///< for a laser's account of a pulse that is over
 
 double grace_s(const Clock& clock, double cell_s, double least_wall_s = kWallGraceS) {
@@ -106,6 +111,8 @@ class Run {
   void prepare_next(std::size_t i);
   template <std::size_t N>
   void prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& told, std::size_t next);
+  void wait_for_sight();
+  void check_in_place(const char* when);
   void check_pulse_conditions(const Laser::Status& laser);
   void wait_pulse_end(double fired_s, const Exposure& exposure);
   void count_own_time() { own_s_ += cell_.clock.now_s() - idle_since_s_; }
@@ -312,17 +319,38 @@ std::span<const Via> Run::vias_of(std::size_t i) {
   return std::span(program_.vias).subspan(first, next_via_ - first);
 }
 
-/// The light goes out at once, whoever gates it, when what it needs is gone: a robot in alarm may have forgotten the
-/// end of the pulse that it was told.
-void Run::check_pulse_conditions(const Laser::Status& laser) {
+/// Until what is known of both chains is of the present.
+void Run::wait_for_sight() {
+  const double begun_s = cell_.clock.now_s();
+  const double since_s = begun_s - grace_s(cell_.clock, kSightS, kSightWallS);
+  const auto is_seen = [since_s](double read_s) { return read_s == 0 || read_s >= since_s; };
+  for (;;) {
+    const bool sees_robot = is_seen(cell_.robot.status().read_s);
+    if (sees_robot && is_seen(cell_.table.status().read_s)) return;
+    const double now_s = cell_.clock.now_s();
+    if (now_s > begun_s + grace_s(cell_.clock, kGraceS))
+      throw DriverError(std::string("the ") + (sees_robot ? "table" : "robot") + " has told nothing for too long");
+    cell_.clock.sleep_until(now_s + description_.timing.tick_s);
+  }
+}
+
+/// By measure: a controller that times the pulse in its queue of motions may call itself busy.
+void Run::check_in_place(const char* when) {
   const auto robot = cell_.robot.status();
   const auto table = cell_.table.status();
   check_under_way("robot", robot);
   check_under_way("table", table);
+  if (!is_near(robot.positions, *robot_target_))
+    throw DriverError(std::string("the robot left its position ") + when + " a pulse");
+  if (!is_near(table.positions, *table_target_))
+    throw DriverError(std::string("the table left its position ") + when + " a pulse");
+}
+
+/// The light goes out at once, whoever gates it, when what it needs is gone: a robot in alarm may have forgotten the
+/// end of the pulse that it was told.
+void Run::check_pulse_conditions(const Laser::Status& laser) {
   if (!laser.interlock_closed) throw DriverError("the interlock was opened during a pulse");
-  // By measure: a controller that times the pulse in its queue of motions may call itself busy.
-  if (!is_near(robot.positions, *robot_target_)) throw DriverError("the robot left its position during a pulse");
-  if (!is_near(table.positions, *table_target_)) throw DriverError("the table left its position during a pulse");
+  check_in_place("during");
 }
 
 /// The pulse's length is the device's business; here is only waited for its end, woken by whatever changes.
@@ -373,6 +401,8 @@ void Run::prepare_next(std::size_t i) {
 void Run::expose(std::size_t i) {
   const Exposure& exposure = program_.exposures[i];
   check_laser_ready();
+  wait_for_sight();
+  check_in_place("before");
   end_if_asked_or_paused();
 
   journal_.arm(i);
@@ -387,7 +417,8 @@ void Run::expose(std::size_t i) {
     prove_laser_off();
     // Whoever cuts a pulse sets the flag before, so a flag that is still clear here means that the pulse was whole.
     end_if_asked();
-    // Whoever gates the light may have failed in the pulse and cut it.
+    // Whoever gates the light may have failed in the pulse and cut it, and an axis may have left its place unseen.
+    wait_for_sight();
     const auto after = cell_.laser.status();
     check_pulse_conditions(after);
     if (after.state != DeviceState::kReady)

@@ -32,6 +32,9 @@ class AxisGroup {
     std::string fault;         ///< a sentence, if state is kFault
     /// When the first frame or reply came that showed it in position and settled, on the cell's clock; 0 if unknown.
     double in_position_since_s = 0;
+    /// When the frame came, or the reading was begun, that all this is known by, on the cell's clock; 0: it is of the
+    /// present.
+    double read_s = 0;
   };
 
   virtual ~AxisGroup() = default;

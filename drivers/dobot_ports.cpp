@@ -189,8 +189,10 @@ void DobotPorts::run() {
       const int ready = ::poll(polled.data(), polled.size(), static_cast<int>(std::max<long long>(left, 0)));
       if (ready < 0 && errno != EINTR) throw LinkError("the robot's ports can't be polled");
       if (polled[0].revents != 0) return;
-      if (ready > 0 && polled[1].revents != 0) read_motion();
+      // All frames that came before an answer are older than it: a reader that was kept waiting must not take one of
+      // them for what followed.
       if (ready > 0 && polled[2].revents != 0) read_feedback();
+      if (ready > 0 && polled[1].revents != 0) read_motion();
       if (Steady::now() >= feedback_deadline_)
         throw LinkError("the robot's feedback has stopped (" + feedback_->name() + ")");
     }
@@ -199,13 +201,18 @@ void DobotPorts::run() {
   }
 }
 
+/// What has come, within a bound: seconds of frames.
 void DobotPorts::read_feedback() {
+  constexpr int kReadsMax = 100;
   std::array<char, 8 * kDobotFrameBytes> bytes{};
-  const std::size_t got = feedback_->read(bytes.data(), bytes.size(), Steady::now());
-  frames_.push({bytes.data(), got});
-  while (const auto frame = frames_.next()) {
-    feedback_deadline_ = deadline_in(feedback_silence_s_);
-    listener_.on_frame(*frame);
+  std::size_t got = bytes.size();
+  for (int i = 0; i < kReadsMax && got == bytes.size(); ++i) {
+    got = feedback_->read(bytes.data(), bytes.size(), Steady::now());
+    frames_.push({bytes.data(), got});
+    while (const auto frame = frames_.next()) {
+      feedback_deadline_ = deadline_in(feedback_silence_s_);
+      listener_.on_frame(*frame);
+    }
   }
 }
 

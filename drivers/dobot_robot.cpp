@@ -323,6 +323,7 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     if (frame_count_ > 0 && frame.time_ms == frame_.time_ms) return;  // stale
     ++frame_count_;
     frame_ = frame;
+    frame_s_ = clock_.now_s();
     const bool is_on = state_ == DeviceState::kEnabled || state_ == DeviceState::kReady;
     const bool is_alive = is_on || state_ == DeviceState::kConnected;
     if (is_alive && (frame.mode == DobotMode::kError || frame.has_error))
@@ -352,6 +353,7 @@ DobotRobot::Status DobotRobot::status() {
   status.in_position = state_ == DeviceState::kReady && is_in_position_;
   status.fault = fault_;
   status.in_position_since_s = status.in_position ? in_position_since_s_ : 0;
+  status.read_s = frame_s_;
   return status;
 }
 

@@ -74,6 +74,7 @@ class DobotRobot final : public Robot {
   std::string fault_;
   std::uint64_t frame_count_ = 0;
   DobotFrame frame_;
+  double frame_s_ = 0;  ///< when it came
   bool is_target_current_ = false, is_in_position_ = false;
   DobotJoints target_{};
   std::size_t queued_ = 0;  ///< targets since it was in position, or stopped

@@ -286,6 +286,7 @@ typename DriveGroup<N>::Status DriveGroup<N>::status() {
   status.in_position = state_ == DeviceState::kReady && is_in_position_;
   status.fault = fault_;
   status.in_position_since_s = status.in_position ? in_position_since_s_ : 0;
+  status.read_s = read_s_;
   return status;
 }
 
@@ -371,6 +372,7 @@ void DriveGroup<N>::take(const Readings& readings, double begun_s) {
   {
     const std::lock_guard lock(mutex_);
     for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_ours(readings[i].position);
+    read_s_ = begun_s;
     const bool was_in_position = is_in_position_;
     if (!is_target_current_ || !is_accepted_ || begun_s < accepted_s_ || !is_at_target(readings)) {
       rest_s_ = -1;

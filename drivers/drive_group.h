@@ -94,7 +94,7 @@ class DriveGroup final : public AxisGroup<N> {
   std::optional<Ahead> ahead_;               ///< of the next move; only while no axis moves
   double accepted_s_ = 0, settle_s_ = 0, arrival_s_ = 0;
   double rest_s_ = -1;  ///< since when it rests at the target, on the cell's clock; negative: it doesn't
-  double in_position_since_s_ = 0;
+  double in_position_since_s_ = 0, read_s_ = 0;
   std::thread thread_;
 };
 

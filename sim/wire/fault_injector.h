@@ -16,9 +16,7 @@ class FaultInjector {
   /// `alarm`: raises the robot's or the table's own alarm.
   using RaiseAlarm = std::function<void(WireDevice)>;
 
-  explicit FaultInjector(TrueCell& cell, const FaultScript& script = {}) : cell_(cell) {
-    for (const WireFault& fault : script) add(fault);
-  }
+  explicit FaultInjector(TrueCell& cell) : cell_(cell) {}
   void set_alarm(RaiseAlarm alarm) { raise_alarm_ = std::move(alarm); }
 
   void add(const WireFault& fault);

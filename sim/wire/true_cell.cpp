@@ -117,7 +117,7 @@ bool TrueCell::is_moving(int index) const {
 bool TrueCell::is_settled(int index) const {
   constexpr double kRoundingS = 1e-9;
   const Axis& axis = axes_[static_cast<std::size_t>(index)];
-  return !is_moving(index) && now_s_ >= axis.settled_s - kRoundingS && now_s_ < axis.off_since_s + kNoticeS;
+  return !is_moving(index) && now_s_ >= axis.settled_s - kRoundingS && now_s_ < axis.off_since_s + options_.notice_s;
 }
 
 bool TrueCell::is_settled() const {

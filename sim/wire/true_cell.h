@@ -25,6 +25,7 @@ class TimeRecord;
 struct TrueCellOptions {
   double start_delay_s = 5;  ///< from the order to emit until light may come (CDRH)
   double warm_up_s = 0;      ///< from time 0
+  double notice_s = .03;     ///< so long an axis must be off before light there is a fault
 };
 
 class TrueCell {
@@ -32,7 +33,6 @@ class TrueCell {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
   static constexpr double kCreep = 1e-4;          ///< rad; prismatic joints a tenth of it, in m
   static constexpr double kOutOfPosition = 2e-4;  ///< rad or m off the target: an axis that drifted
-  static constexpr double kNoticeS = .03;         ///< so long an axis must be off before light there is a fault
 
   explicit TrueCell(const CellDescription& description, const TrueCellOptions& options = {});
 

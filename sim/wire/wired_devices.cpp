@@ -23,8 +23,8 @@ std::unique_ptr<DriveBank> make_bank(WireOptions::Table table, const DriveAxis& 
 
 WiredDevices::WiredDevices(const CellDescription& description, const WireOptions& options)
     : options_(options),
-      cell_(description, {options.start_delay_s, options.warm_up_s}),
-      faults_(cell_, options.faults),
+      cell_(description, {options.start_delay_s, options.warm_up_s, options.notice_s}),
+      faults_(cell_),
       robot_(cell_, faults_, times_) {
   cell_.set_time_record(&times_);
   const double steps_per_rad = options.steps_per_deg * 180 / std::numbers::pi;
@@ -35,6 +35,7 @@ WiredDevices::WiredDevices(const CellDescription& description, const WireOptions
     if (device == WireDevice::kRobot) robot_.raise_alarm(kOverload);
     if (device == WireDevice::kTable) table_axis(0).raise_alarm(kOverload);
   });
+  for (const WireFault& fault : options.faults) faults_.add(fault);  // some begin at once
 }
 
 void WiredDevices::look() {

@@ -27,7 +27,8 @@ using test::VirtualCell;
 using test::WiredWorld;
 
 constexpr std::size_t kDots = 12;
-constexpr double kDriftUnseen = 1e-3;  ///< rad, m
+constexpr double kDriftUnseen = 1e-3;         ///< rad, m
+constexpr double kDriftUnseenOnWires = 3e-3;  ///< all of one there: see in_wall_time()
 
 /// [first, end) of the cases to run.
 std::pair<unsigned, unsigned> cases(unsigned slice, unsigned whole) {
@@ -53,6 +54,8 @@ class CampaignWorld {
   virtual void forget_stop() = 0;
   /// How long a case may take, in cell seconds: twelve dots take two; faults and patience the rest.
   virtual double patience_s() const = 0;
+  /// How far an axis may drift without anybody's seeing it in time.
+  virtual double drift_unseen() const = 0;
   /// Where the robot itself loses the queued end of a pulse (an alarm; a refusal or a lost connection between on and
   /// off): from there until its controller has seen that and turned the light off by another way.
   virtual double lost_end_s() const = 0;
@@ -80,6 +83,7 @@ class VirtualWorld final : public CampaignWorld {
   }
   void forget_stop() override { cell_.clock.on_time = {}; }
   double patience_s() const override { return 300; }
+  double drift_unseen() const override { return kDriftUnseen; }
   /// Here asking for a status waits for a device that is late, unlike in real drivers: two patiences of the link.
   double lost_end_s() const override { return .25; }
 
@@ -93,7 +97,7 @@ class WorldOnWires final : public CampaignWorld {
   WorldOnWires() : world_(WiredWorld::quick(kTimeScale)) {}
   Cell cell() override { return world_.cell(); }
   std::vector<Emission> emissions() override { return world_.emissions(); }
-  void add(const WireFault& fault) override { world_.wire().add_fault(fault); }
+  void add(const WireFault& fault) override { world_.wire().add_fault(test::in_wall_time(fault, kTimeScale)); }
   bool is_emitting() override {
     bool is_lit = false;
     world_.wire().act([&](TrueCell& cell) { is_lit = cell.is_emitting(); });
@@ -110,6 +114,7 @@ class WorldOnWires final : public CampaignWorld {
     if (stopper_.joinable()) stopper_.join();
   }
   double patience_s() const override { return 60 / kTimeScale; }
+  double drift_unseen() const override { return kDriftUnseenOnWires; }
   /// Wall time, as the cell's clock counts it.
   double lost_end_s() const override { return .3 / kTimeScale; }
   const CellDescription& description() const { return world_.description; }
@@ -133,7 +138,8 @@ class Case {
         description_(description),
         program_(test::small_job(description, kDots, 1 + number % 50, 4)),
         world_(world),
-        journal_(Journal::in_memory(kDots)) {}
+        journal_(Journal::in_memory(kDots)),
+        witness_{.joint_tolerance = world.drift_unseen()} {}
   ~Case() { world_.forget_stop(); }
   Case(const Case&) = delete;
   Case& operator=(const Case&) = delete;
@@ -153,7 +159,7 @@ class Case {
   ExecutionControl control_;
   std::string story_;
   /// An axis that drifts a little is still in position: within what counts as that, and what passes before it is seen.
-  test::WitnessOptions witness_{.joint_tolerance = kDriftUnseen};
+  test::WitnessOptions witness_;
 };
 
 void Case::order_faults() {

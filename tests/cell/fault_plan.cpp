@@ -27,6 +27,11 @@ WireFault random_fault(std::mt19937& random, std::size_t dots) {
   return fault;
 }
 
+WireFault in_wall_time(WireFault fault, double time_scale) {
+  if (fault.kind == WireFaultKind::kAxisDrift) fault.amount *= time_scale;
+  return fault;
+}
+
 std::string described(const WireFault& fault) {
   char text[200];
   std::snprintf(text, sizeof text, "%s of %s (axis %s, amount %.3g), %.2f ms into %s %llu, %llu messages, %.1f ms",

@@ -316,6 +316,55 @@ TEST(ExecutorTest, TellsTheLaserItsNextPowerWhileTheAxesMove) {
   expect_painted_once(program, journal, world.emissions());
 }
 
+/// A table whose word reaches nobody from the first pulse on, for so long; it drifts meanwhile.
+class UnheardTable final : public Table {
+ public:
+  UnheardTable(Cell cell, double unheard_s) : cell_(cell), unheard_s_(unheard_s) {}
+  void connect() override {}
+  void enable() override {}
+  void home() override {}
+  void disable() noexcept override { cell_.table.disable(); }
+  void clear_fault() override {}
+  void move_to(const Positions& target, double settle_s) override { cell_.table.move_to(target, settle_s); }
+  Status status() override {
+    const double now_s = cell_.clock.now_s();
+    if (!heard_ && cell_.laser.status().is_emitting) {
+      heard_ = cell_.table.status();
+      heard_->read_s = now_s;
+    }
+    if (heard_ && now_s < heard_->read_s + unheard_s_) return *heard_;
+    Status status = cell_.table.status();
+    status.read_s = now_s;
+    if (heard_) status.positions[0] += .01;
+    return status;
+  }
+  double expected_arrival_s() override { return cell_.table.expected_arrival_s(); }
+  void stop() noexcept override { cell_.table.stop(); }
+
+ private:
+  const Cell cell_;
+  const double unheard_s_;
+  std::optional<Status> heard_;
+};
+
+TEST(ExecutorTest, APulseIsNotBelievedByWhatWasKnownBeforeIt) {
+  for (const double unheard_s : {.2, 1e6}) {
+    auto program = small_program(10);
+    for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
+    WitnessedCell world;
+    Journal journal = Journal::in_memory(10);
+    ExecutionControl control;
+    UnheardTable table(world.cell(), unheard_s);
+    const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
+                                world.description, journal, control);
+    EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
+    EXPECT_EQ(result.reason,
+              unheard_s < 1 ? "the table left its position during a pulse" : "the table has told nothing for too long");
+    EXPECT_EQ(journal.in_doubt(), std::vector<std::size_t>{0});
+    EXPECT_EQ(journal.done_count(), 0u);
+  }
+}
+
 TEST(ExecutorTest, AStopForgetsWhatWasHandedAhead) {
   const auto program = roundabout_program(60);
   for (int call = 1; call < 200; call += 3) {
