@@ -77,6 +77,12 @@ void DriveGroup<N>::connect() {
     state_ = DeviceState::kConnected;
   }
   start_polling();
+  try {
+    check_alarms(readings);
+  } catch (const DriverError& error) {
+    set_fault(error.what());  // it is connected, and can be cleared
+    throw;
+  }
 }
 
 template <std::size_t N>

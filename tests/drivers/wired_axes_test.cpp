@@ -128,6 +128,20 @@ TEST_P(WiredAxes, AnAlarmIsAFaultThatCanBeCleared) {
   move({.1, .3});
 }
 
+TEST_P(WiredAxes, AnAlarmFromBeforeIsToldAtOnceAndCanBeCleared) {
+  WireFault fault;
+  fault.kind = WireFaultKind::kDeviceAlarm;
+  fault.device = WireDevice::kTable;
+  fault.trigger.at_s = cell.wire.now_s();
+  cell.wire.add_fault(fault);
+  EXPECT_THROW(table->connect(), DriverError);
+  EXPECT_EQ(table->status().state, DeviceState::kFault);
+  table->clear_fault();
+  table->enable();
+  table->home();
+  move({.1, .3});
+}
+
 TEST_P(WiredAxes, ALostConnectionIsAFaultThatCanBeCleared) {
   WiredCell::make_ready(*table);
   WireFault fault;
