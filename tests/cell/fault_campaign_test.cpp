@@ -179,6 +179,7 @@ void Case::order_faults() {
 
 bool Case::recover() {
   constexpr int kAttempts = 400;
+  if (control_.stop.load()) world_.forget_stop();  // as in the daemon: nothing is cleared while a stop is under way
   control_.stop = false;
   const Cell cell = world_.cell();
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
