@@ -19,8 +19,6 @@ constexpr double kSetpointWindow = 2e-5;  ///< deg, mm: what six decimals and th
 constexpr double kRestSpeed = 0.5;        ///< deg/s, mm/s
 constexpr double kStampMs = 1;            ///< resolution of the frames' time stamps
 constexpr std::size_t kJ3Index = 2;
-constexpr double kBoundsTolerance = 1e-9;
-constexpr double kLongestSettleS = 60;
 
 double window_of(const DobotOptions& options, std::size_t joint) {
   return joint == kJ3Index ? options.window_m * 1e3 : options.window_rad * 180 / std::numbers::pi;
@@ -280,10 +278,12 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
 
 /// The controller's own account: its profile has ended at the target, nothing turns, nothing is queued.
 bool DobotRobot::is_at_rest(const DobotFrame& frame) const {
-  // While the queue times a pulse the controller calls itself running.
-  const bool is_busy =
-      std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) { return gate.second->is_busy(); });
-  if (!is_busy && (frame.mode != DobotMode::kEnabled || frame.is_running)) return false;
+  // While the queue times a pulse the controller calls itself running; that is no motion where the arm stood already.
+  // Before, running is believed: a frame may show the very begin of a move, at no speed yet, and the next one its end.
+  const bool is_pulsing_in_place = is_in_position_ && std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) {
+                                     return gate.second->is_busy();
+                                   });
+  if (!is_pulsing_in_place && (frame.mode != DobotMode::kEnabled || frame.is_running)) return false;
   for (std::size_t i = 0; i < target_.size(); ++i)
     if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) || !(std::abs(frame.speed[i]) <= kRestSpeed))
       return false;
