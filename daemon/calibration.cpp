@@ -4,6 +4,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/job_sampling.h"
+#include "daemon/output_files.h"
 #include "daemon/pipeline.h"
 #include "daemon/report.h"
 #include "daemon/wedge.h"
@@ -14,11 +15,6 @@ namespace hilbrush {
 namespace {
 
 constexpr double kDefaultDpi = 100;  // where the spot is given in pitches the curve does not depend on the pitch
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-}
 
 double pitch_of(const JobSettings& settings) {
   return 25.4e-3 / settings.dpi.value_or(kDefaultDpi);
@@ -63,7 +59,7 @@ std::string curve_entry(const ToneCurve& curve, const JobSettings& settings, con
 
 std::string run_calibrate(const PipelineRequest& request, const std::filesystem::path& measured,
                           const PipelineListener& listener) {
-  make_folder(request.output);
+  make_output_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   if (calibrated_sampler(request.settings.sampler) != request.settings.sampler)
     throw InputError("sampler", std::string(sampler_name(request.settings.sampler)) + " paints by the tone curve of " +
@@ -78,7 +74,7 @@ std::string run_calibrate(const PipelineRequest& request, const std::filesystem:
 }
 
 std::string run_wedge(const PipelineRequest& request) {
-  make_folder(request.output);
+  make_output_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   const JobSettings settings = wedge_settings(request.settings);
   const WedgeCard card =

@@ -15,6 +15,7 @@
 #include "config/cell_file.h"
 #include "daemon/executor.h"
 #include "daemon/job_sampling.h"
+#include "daemon/output_files.h"
 #include "daemon/painted_dots.h"
 #include "daemon/planning_pictures.h"
 #include "daemon/report.h"
@@ -95,14 +96,6 @@ PlacementOptions placement_options(const JobSettings& settings) {
   if (settings.units_mm) options.unit_m = *settings.units_mm * 1e-3;
   if (settings.up) options.up = *settings.up == "y" ? UpAxis::kY : UpAxis::kZ;
   return options;
-}
-
-void make_output_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error || !std::filesystem::is_directory(folder))
-    throw InputError(folder.string(),
-                     "can't be made or is no folder" + (error ? ": " + error.message() : std::string()));
 }
 
 /// The object on the table: everything that later stages look at but never edit. Members refer to each other, so it

@@ -270,17 +270,4 @@ DotCounts dot_counts_from_report(const std::filesystem::path& report_file) {
   });
 }
 
-void write_text_file(const std::filesystem::path& file, const std::string& text) {
-  const std::filesystem::path temporary = file.string() + ".part";
-  {
-    std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-    out << text;
-    out.flush();
-    if (!out) throw InputError(file.string(), "can't be written (no such folder, no permission, or the disk is full)");
-  }
-  std::error_code error;
-  std::filesystem::rename(temporary, file, error);
-  if (error) throw InputError(file.string(), "can't be written: " + error.message());
-}
-
 }  // namespace hilbrush

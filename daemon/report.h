@@ -82,7 +82,4 @@ DotCounts dot_counts_from_report(const std::filesystem::path& report_file);
 /// @throws InputError naming the file.
 std::vector<SkippedFigures> skipped_figures_from_report(const std::filesystem::path& report_file);
 
-/// Replaces `file` in one step, so that it is whole or absent. @throws InputError naming the file.
-void write_text_file(const std::filesystem::path& file, const std::string& text);
-
 }  // namespace hilbrush

@@ -14,7 +14,7 @@ namespace hilbrush {
 namespace {
 
 /// All figures are relative: any size will do.
-constexpr double kSize_m = .1;
+constexpr double kSizeM = .1;
 
 /// What dots follow on a model.
 const std::vector<std::string> kDensities{"constant", "texture", "mean_curvature", "gaussian_curvature"};
@@ -69,7 +69,7 @@ class ModelSet : public MeasuredSet {
  private:
   static TexturedMesh load(const std::string& file, std::size_t density) {
     PlacementOptions placement;
-    placement.size_m = kSize_m;
+    placement.size_m = kSizeM;
     TexturedMesh mesh = place_on_table(load_model(file, load_image_file), placement);
     if (density == kConstant) return repair_mesh(blackened(std::move(mesh))).mesh;
     return with_curvature_density(repair_mesh(std::move(mesh)).mesh, source_of(density));

@@ -1,10 +1,10 @@
 #include "daemon/quality/quality.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "config/json_reader.h"
+#include "daemon/output_files.h"
 #include "daemon/quality/figures.h"
 #include "daemon/quality/measured_set.h"
 #include "daemon/quality/plots.h"
@@ -15,22 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint64_t kMostDots = 20'000'000;
+constexpr std::uint64_t kMostMeasuredDots = 20'000'000;
 constexpr std::size_t kMostCounts = 64;
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error || !std::filesystem::is_directory(folder))
-    throw InputError(folder.string(), "can't be made or is no folder");
-}
-
-void write_text(const std::string& text, const std::filesystem::path& file) {
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out << text << '\n';
-  out.close();
-  if (!out) throw InputError(file.string(), "can't be written: is the disk full?");
-}
 
 Json json_of(const QualityRequest& request, const MeasuredSet& set) {
   Json json{{"kind", set.kind}, {"set", std::filesystem::path(request.set).filename().string()}};
@@ -94,7 +80,7 @@ QualityRequest quality_request_from_json(const std::string& text) {
     request.seed = json.optional_integer("seed", 0, ~std::uint64_t{0} >> 1).value_or(1);
     request.shapes = json.optional_integer("shapes", 1, 1'000'000).value_or(1000);
     if (json.has("count"))
-      for (const double count : json.numbers("count", 1, kMostCounts, {1, static_cast<double>(kMostDots)}))
+      for (const double count : json.numbers("count", 1, kMostCounts, {1, static_cast<double>(kMostMeasuredDots)}))
         request.counts.push_back(static_cast<std::uint64_t>(count));
   });
   return request;
@@ -107,7 +93,7 @@ std::string run_quality(const QualityRequest& request, const std::filesystem::pa
   };
   tell("load", 0);
   const std::unique_ptr<MeasuredSet> set = make_measured_set(request);
-  make_folder(output);
+  make_output_folder(output);
   for (const std::string& note : set->notes)
     if (listener.on_warning) listener.on_warning(note);
 
@@ -132,7 +118,7 @@ std::string run_quality(const QualityRequest& request, const std::filesystem::pa
   json["files"] = files;
   json["version"] = HILBRUSH_VERSION;
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  write_text(text, output / "quality.json");
+  write_text_file(output / "quality.json", text + "\n");
   return text;
 }
 

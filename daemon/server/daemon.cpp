@@ -1,12 +1,6 @@
 #include "daemon/server/daemon.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <stdexcept>
 
 #include "config/cell_file.h"
@@ -17,6 +11,7 @@
 #include "daemon/server/cell_thread.h"
 #include "daemon/server/job_book.h"
 #include "daemon/server/job_store.h"
+#include "daemon/server/lock_file.h"
 #include "daemon/server/method_table.h"
 #include "daemon/server/pipeline_child.h"
 #include "daemon/server/server.h"
@@ -26,29 +21,6 @@ namespace hilbrush {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Held as long as the daemon lives: two daemons never share a state folder, a socket or a cell. The file stays; only
-/// the lock on it counts.
-class LockFile {
- public:
-  LockFile(const fs::path& file, const std::string& held)
-      : fd_(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640)) {
-    if (fd_ < 0) throw std::runtime_error(file.string() + ": can't be opened: " + std::strerror(errno));
-    // A child of a daemon that was killed may hold its lock for a moment longer.
-    for (int attempt = 0; attempt < 50; ++attempt) {
-      if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
-      ::usleep(10000);
-    }
-    ::close(fd_);
-    throw std::runtime_error(held + ": another hilbrushd uses it");
-  }
-  ~LockFile() { ::close(fd_); }
-  LockFile(const LockFile&) = delete;
-  LockFile& operator=(const LockFile&) = delete;
-
- private:
-  int fd_;
-};
 
 fs::path made_folder(const fs::path& folder) {
   std::error_code error;
