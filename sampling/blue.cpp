@@ -50,7 +50,7 @@ double reach_of(const PlacedStratum& stratum) {
 
 /// Strata see each other if they face the same way, or hang together over a fold; not through a wall.
 IndexLists find_neighbours(const SurfaceCurve& curve, const PlacedStrata& strata) {
-  std::vector<Ball> balls;
+  std::vector<SizedBall> balls;
   balls.reserve(strata.strata.size());
   for (const PlacedStratum& stratum : strata.strata) balls.push_back({stratum.middle_O, reach_of(stratum)});
   tbb::enumerable_thread_specific<GrowingBall> growing_balls(

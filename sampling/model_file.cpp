@@ -5,6 +5,7 @@
 
 #include "sampling/files/face_list.h"
 #include "sampling/files/mesh_file.h"
+#include "sampling/files/text_lines.h"
 #include "sampling/input_error.h"
 #include "sampling/model_folder.h"
 #include "sampling/vrml/reading.h"
@@ -15,12 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 enum class Kind { kVrml, kObj, kPly, kOff, kStl };
-
-std::string lower_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
 
 bool starts_with(std::string_view text, std::string_view head) {
   return text.substr(0, head.size()) == head;

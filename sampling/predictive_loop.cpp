@@ -173,9 +173,9 @@ class AskedTexels {
 /// blank.
 std::optional<SurfacePoint> point_with_tone(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
                                             Vector2d low, Vector2d high) {
-  constexpr int kMostHalvings = 40;
+  constexpr int kMostSteps = 40;
   ToneIntegral integral = asked.integrate(triangle, frame.clip_box(low, high).corners());
-  for (int halving = 0; halving < kMostHalvings && integral.mass > 0; ++halving) {
+  for (int halving = 0; halving < kMostSteps && integral.mass > 0; ++halving) {
     const Vector2d b = integral.first / integral.mass;
     const SurfacePoint centre{triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
     if (asked.asked(centre) > 0) return centre;

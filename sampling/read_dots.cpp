@@ -44,7 +44,7 @@ constexpr std::array<NumberType, 8> kTypes{{{"char", "int8", 1, read_as<std::int
                                             {"float", "float32", 4, read_as<float>},
                                             {"double", "float64", 8, read_as<double>}}};
 
-struct Header {
+struct DotsHeader {
   std::uint64_t count = 0;
   std::size_t row_bytes = 0;
   std::vector<Property> properties;
@@ -57,11 +57,11 @@ struct Header {
   }
 };
 
-class HeaderReader {
+class DotsHeaderReader {
  public:
-  HeaderReader(std::istream& in, const std::filesystem::path& file) : in_(in), file_(file) {}
+  DotsHeaderReader(std::istream& in, const std::filesystem::path& file) : in_(in), file_(file) {}
 
-  Header read() {
+  DotsHeader read() {
     if (next_line() != "ply") refuse("is no PLY file");
     while (true) {
       std::istringstream words(next_line());
@@ -126,7 +126,7 @@ class HeaderReader {
 
   std::istream& in_;
   const std::filesystem::path& file_;
-  Header header_;
+  DotsHeader header_;
   int element_count_ = 0;
 };
 
@@ -135,7 +135,7 @@ class HeaderReader {
 DotSequence read_dots(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file.string(), "can't be opened");
-  const Header header = HeaderReader(in, file).read();
+  const DotsHeader header = DotsHeaderReader(in, file).read();
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error || header.count > size / header.row_bytes)

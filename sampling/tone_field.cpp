@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "sampling/check.h"
+#include "sampling/cross.h"
 #include "sampling/tone/tone_polygon.h"
 
 namespace hilbrush {
@@ -21,10 +22,6 @@ constexpr double kLeastTexels = 1e-3;
 /// Of all layers together, about; and the finest that a texel is cut, along a side.
 constexpr double kRefinedTexels = 12e6;
 constexpr int kMostRefinement = 15;
-
-double cross(const Vector2d& a, const Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 /// Opens a triangle that is a line or a point in its texture, by a thousandth of a texel.
 void open_collapsed(std::array<Vector2d, 3>& p) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sampling/check.h"
+#include "sampling/cross.h"
 #include "sampling/curve/quad_walk.h"
 
 namespace hilbrush {
@@ -14,10 +15,6 @@ namespace {
 
 /// Quads that one thread takes at once.
 constexpr std::size_t kGrain = 256;
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 /// m^2 for a unit of the square; infinite where the map has no area.
 double density_on_square(const Sheet& sheet, const TriangleTone& tone, const SheetFace& face) {

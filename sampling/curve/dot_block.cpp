@@ -19,10 +19,6 @@ constexpr double kOnSide = 1e-12;
 /// Where a sequence hits blank surface within a patch, so many other places in the patch are tried.
 constexpr int kMostTries = 8;
 
-SurfacePoint surface_point(std::uint32_t triangle, const Vector2d& b) {
-  return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
-}
-
 /// A place on the square, on the faces of a base quad.
 struct Lifted {
   std::uint32_t frame = 0;

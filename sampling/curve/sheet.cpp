@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sampling/cross.h"
+
 namespace hilbrush {
 namespace {
 
@@ -26,10 +28,6 @@ constexpr double kCubeMargin = 1.05, kCubeMiddle = .4871828;
 constexpr std::size_t kMostListed = 1'000'000, kMostListedPerFace = 60;
 /// Rounding may not lose a triangle that touches a quad.
 constexpr double kTouch = 1e-14;
-
-double cross(const Vector2d& a, const Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 /// Builds the base tree of one sheet for one kind of curve.
 template <class Curve>

@@ -14,10 +14,6 @@ constexpr double kBlankShare = 1e-3;
 /// ... which no place does that asks for this much: nothing asks for a thousand times as much.
 constexpr double kSurelyPainted = .01;
 
-SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d& b) {
-  return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
-}
-
 /// Of a base quad's faces with mass, the point nearest to `target_O`.
 SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t quad_index,
                              const Eigen::Vector3d& target_O) {

@@ -10,6 +10,11 @@
 /// What a stratum gathers from the patches that it is made of, until it is known where its dot goes.
 namespace hilbrush {
 
+/// `b`: the shares of the second and the third corner.
+inline SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d& b) {
+  return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
+}
+
 /// The share of a stratum on one sheet: a stratum that spans two sheets puts its dot on one of them.
 struct StratumPart {
   std::uint32_t sheet = 0;

@@ -15,7 +15,7 @@ constexpr double kLeastExcess = 1e-6;
 constexpr double kNearestToEnd = .05;
 constexpr double kShortestSplit = .01;
 /// Sine over cosine of an angle that counts as 180 degrees.
-constexpr double kFlattest = 1e-6;
+constexpr double kSmallestSine = 1e-6;
 /// Nothing less urgent than this share of the whole area is split: it changes the map too little.
 constexpr double kLeastUrgency = 1e-4;
 /// Worse weights than this are all as urgent, so that length decides between needles.
@@ -88,10 +88,10 @@ struct Apex {
 /// How far below 0 the cotan weight of an edge is, times its length squared: what clamping it does to the map's energy.
 double negative_energy(const Disk& disk, TriangleSide s) {
   const Apex here(disk, s);
-  double cotans = here.cosine / std::max(here.sine, kFlattest * std::abs(here.cosine));
+  double cotans = here.cosine / std::max(here.sine, kSmallestSine * std::abs(here.cosine));
   if (const TriangleSide across = disk.neighbours()[s.triangle][s.side]; across != kNoSide) {
     const Apex there(disk, across);
-    cotans += there.cosine / std::max(there.sine, kFlattest * std::abs(there.cosine));
+    cotans += there.cosine / std::max(there.sine, kSmallestSine * std::abs(there.cosine));
   }
   return cotans < -kLeastExcess ? std::min(-cotans, kMostDeficit) * disk.length(s) * disk.length(s) : 0;
 }

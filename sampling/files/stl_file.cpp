@@ -15,13 +15,6 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 80, kTriangleBytes = 50;
 
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  for (char& c : out)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return out;
-}
-
 std::uint32_t count_of(const std::string& bytes) {
   std::uint32_t count = 0;
   for (int i = 3; i >= 0; --i)

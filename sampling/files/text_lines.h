@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <system_error>
 
@@ -21,6 +22,14 @@ inline std::optional<std::string_view> take_line(std::string_view& text) {
     text.remove_prefix(end + (is_pair ? 2 : 1));
   }
   return line;
+}
+
+/// ASCII letters only.
+inline std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower;
 }
 
 /// Takes the next word off `line`; empty at its end.

@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 /// Tone is looked up so many times a pitch along a contour.
 constexpr double kLooksPerPitch = 8;
 /// Rounds of the search for the pitch, and when it has ended.
-constexpr int kMostRounds = 8;
+constexpr int kMostTrials = 8;
 constexpr double kCloseEnough = .002;
 constexpr double kMostSlices = 1e7;
 
@@ -69,7 +69,7 @@ double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
 double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, std::uint64_t count) {
   const double wanted = static_cast<double>(count);
   double pitch = std::sqrt(mass / wanted), best = pitch, best_error = 1e300;
-  for (int round = 0; round < kMostRounds && pitch > 0 && best_error > kCloseEnough; ++round) {
+  for (int round = 0; round < kMostTrials && pitch > 0 && best_error > kCloseEnough; ++round) {
     const double found = toned_length(Slices(mesh, pitch), tone, pitch) / pitch;
     const double error = std::abs(found / wanted - 1);
     if (error < best_error) best_error = error, best = pitch;

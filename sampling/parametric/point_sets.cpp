@@ -15,7 +15,7 @@ using Eigen::Vector2d;
 
 constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 31;
 /// "To avoid the leading zeros phenomenon" (section 5.1.3).
-constexpr std::uint32_t kDropped = 100;
+constexpr std::uint32_t kDroppedPoints = 100;
 
 double radical_inverse_3(std::uint64_t k) {
   double number = 0;
@@ -101,9 +101,9 @@ std::vector<Vector2d> plane_set(PlaneSet set, std::uint64_t count, std::uint64_t
         return Vector2d(radical_inverse_2(k), (static_cast<double>(k) + .5) / static_cast<double>(count));
       });
     case PlaneSet::kSobol:
-      return digital_points(kDropped + 1, count);
+      return digital_points(kDroppedPoints + 1, count);
     case PlaneSet::kNiederreiter:
-      return digital_points(kDropped, count);
+      return digital_points(kDroppedPoints, count);
   }
   return {};
 }

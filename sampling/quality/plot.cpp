@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kWidth = 640, kHeight = 440, kLeft = 76, kRight = 20, kTop = 40, kBottom = 52;
+constexpr double kWidth = 640, kHeight = 440, kLeftMargin = 76, kRightMargin = 20, kTopMargin = 40, kBottomMargin = 52;
 constexpr std::array kColors{"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b", "#6a4c93", "#555555", "#e07a3f", "#008b8b"};
 
 std::string number(double value, int digits = 4) {
@@ -97,8 +97,8 @@ Axis axis_of(const Plot& plot, int coordinate) {
   if (coordinate == 1 && plot.y_most) axis.high = axis.to_scale(*plot.y_most);
   if (!(axis.low <= axis.high)) axis.low = 0, axis.high = 1;
   if (axis.high - axis.low < 1e-9) axis.low -= .5, axis.high += .5;
-  axis.begin = coordinate == 0 ? kLeft : kHeight - kBottom;
-  axis.end = coordinate == 0 ? kWidth - kRight : kTop;
+  axis.begin = coordinate == 0 ? kLeftMargin : kHeight - kBottomMargin;
+  axis.end = coordinate == 0 ? kWidth - kRightMargin : kTopMargin;
   return axis;
 }
 
@@ -189,8 +189,8 @@ bool is_upper_half_full_on_the_right(const Plot& plot, const Axis& x, const Axis
   for (const PlotSeries& series : plot.series)
     for (const Vector2d& point : series.points) {
       if (!point.allFinite() || !x.shows(point.x()) || !y.shows(point.y())) continue;
-      if (y.at(point.y()) > (kTop + kHeight - kBottom) / 2) continue;
-      balance += x.at(point.x()) > (kLeft + kWidth - kRight) / 2 ? 1 : -1;
+      if (y.at(point.y()) > (kTopMargin + kHeight - kBottomMargin) / 2) continue;
+      balance += x.at(point.x()) > (kLeftMargin + kWidth - kRightMargin) / 2 ? 1 : -1;
     }
   return balance > 0;
 }
@@ -200,9 +200,9 @@ bool is_upper_half_full_on_the_right(const Plot& plot, const Axis& x, const Axis
 std::string svg_of(const Plot& plot) {
   const Axis x = axis_of(plot, 0), y = axis_of(plot, 1);
   std::string svg = opening(kWidth, kHeight) + frame_of(plot, x, y);
-  svg += "<clipPath id=\"frame\"><rect x=\"" + place(kLeft - 2) + "\" y=\"" + place(kTop - 2) + "\" width=\"" +
-         place(kWidth - kLeft - kRight + 4) + "\" height=\"" + place(kHeight - kTop - kBottom + 4) +
-         "\"/></clipPath>\n<g clip-path=\"url(#frame)\">\n";
+  svg += "<clipPath id=\"frame\"><rect x=\"" + place(kLeftMargin - 2) + "\" y=\"" + place(kTopMargin - 2) +
+         "\" width=\"" + place(kWidth - kLeftMargin - kRightMargin + 4) + "\" height=\"" +
+         place(kHeight - kTopMargin - kBottomMargin + 4) + "\"/></clipPath>\n<g clip-path=\"url(#frame)\">\n";
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     const PlotSeries& series = plot.series[i];
     const std::string color = kColors[i % kColors.size()];
@@ -212,9 +212,9 @@ std::string svg_of(const Plot& plot) {
   }
   svg += "</g>\n";
   const bool is_legend_left = is_upper_half_full_on_the_right(plot, x, y);
-  const double legend_x = is_legend_left ? kLeft + 8 : kWidth - kRight - 8;
+  const double legend_x = is_legend_left ? kLeftMargin + 8 : kWidth - kRightMargin - 8;
   const std::string anchor = is_legend_left ? "start" : "end";
-  double below = kTop + 16;
+  double below = kTopMargin + 16;
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     if (plot.series[i].name.empty()) continue;
     svg += text_at(legend_x, below, plot.series[i].name,

@@ -14,14 +14,12 @@ namespace {
 
 using Complex = std::complex<double>;
 using Fft = Eigen::FFT<double>;
-using Range = tbb::blocked_range<std::size_t>;
-
-constexpr double kPi = std::numbers::pi;
+using Indices = tbb::blocked_range<std::size_t>;
 
 /// I0(beta sqrt(1 - (2x / width)^2)), x in knots of the grid.
 struct KaiserBessel {
   static constexpr int kWidth = 8;
-  static constexpr double kBeta = kPi * kWidth * .75;  ///< for a grid of twice the resolution
+  static constexpr double kBeta = std::numbers::pi * kWidth * .75;  ///< for a grid of twice the resolution
 
   static double value(double x) {
     const double z = 1 - std::pow(2 * x / kWidth, 2);
@@ -29,7 +27,7 @@ struct KaiserBessel {
   }
   /// Its Fourier transform at `frequency` periods a knot.
   static double transform(double frequency) {
-    const double s = std::sqrt(kBeta * kBeta - std::pow(kPi * kWidth * frequency, 2));
+    const double s = std::sqrt(kBeta * kBeta - std::pow(std::numbers::pi * kWidth * frequency, 2));
     return kWidth * std::sinh(s) / s;
   }
 };
@@ -68,7 +66,7 @@ PointTransform::PointTransform(std::span<const Eigen::Vector2d> points, int high
   const std::vector<double> grid = spread(points, size);
 
   std::vector<Complex> columns(column_count * size);  // by kx, then the row
-  tbb::parallel_for(Range(0, size, 64), [&](const Range& rows) {
+  tbb::parallel_for(Indices(0, size, 64), [&](const Indices& rows) {
     Fft fft;
     fft.SetFlag(Fft::HalfSpectrum);
     std::vector<Complex> transformed(size / 2 + 1);
@@ -79,7 +77,7 @@ PointTransform::PointTransform(std::span<const Eigen::Vector2d> points, int high
   });
 
   values_.resize(column_count * row_count);
-  tbb::parallel_for(Range(0, column_count, 16), [&](const Range& range) {
+  tbb::parallel_for(Indices(0, column_count, 16), [&](const Indices& range) {
     Fft fft;
     std::vector<Complex> transformed(size);
     for (std::size_t kx = range.begin(); kx < range.end(); ++kx) {

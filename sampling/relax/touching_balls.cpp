@@ -26,10 +26,10 @@ struct Cube {
 
 class OctaveGrids {
  public:
-  explicit OctaveGrids(std::span<const Ball> balls) : balls_(balls) {
+  explicit OctaveGrids(std::span<const SizedBall> balls) : balls_(balls) {
     smallest_ = balls[0].radius_m;
     double largest = smallest_;
-    for (const Ball& ball : balls) {
+    for (const SizedBall& ball : balls) {
       smallest_ = std::min(smallest_, ball.radius_m);
       largest = std::max(largest, ball.radius_m);
     }
@@ -130,7 +130,7 @@ class OctaveGrids {
 
   template <class Visit>
   void visit_balls(std::uint32_t ball, const Surrounding& around, bool only_later, Visit& visit) const {
-    const Ball& mine = balls_[ball];
+    const SizedBall& mine = balls_[ball];
     for (std::uint32_t c = 0; c < around.second; ++c) {
       const Cube& cube = cubes_[around.first[c]];
       for (std::uint32_t k = cube.begin; k < cube.end; ++k) {
@@ -142,7 +142,7 @@ class OctaveGrids {
     }
   }
 
-  std::span<const Ball> balls_;
+  std::span<const SizedBall> balls_;
   double smallest_ = 0;
   int last_octave_ = 0;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  ///< key and ball, sorted
@@ -166,7 +166,7 @@ IndexLists lists_of(std::size_t count, const std::vector<std::vector<Pair>>& chu
 
 }  // namespace
 
-IndexLists find_touching_balls(std::span<const Ball> balls,
+IndexLists find_touching_balls(std::span<const SizedBall> balls,
                                const std::function<bool(std::uint32_t, std::uint32_t)>& accept) {
   if (balls.empty()) return {{0}, {}};
   const OctaveGrids grids(balls);

@@ -8,7 +8,7 @@
 /// Who is near whom, for sizes that may differ by orders of magnitude: dots lie dense where the picture is dark.
 namespace hilbrush {
 
-struct Ball {
+struct SizedBall {
   Eigen::Vector3d center_O;
   double radius_m = 0;  ///< more than 0
 };
@@ -27,7 +27,7 @@ struct IndexLists {
 /// For each ball the others that overlap it and that `accept` (symmetric, thread-safe) agrees to. Balls are kept in
 /// grids of one octave of radius each; a pair is found from its smaller ball. Same lists for any number of threads.
 /// Cost: O(balls * octaves + pairs).
-IndexLists find_touching_balls(std::span<const Ball> balls,
+IndexLists find_touching_balls(std::span<const SizedBall> balls,
                                const std::function<bool(std::uint32_t, std::uint32_t)>& accept);
 
 }  // namespace hilbrush

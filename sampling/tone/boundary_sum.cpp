@@ -93,9 +93,9 @@ void add_up_anywhere(const BoundarySum::Pieces& pieces, std::size_t count, Texel
                                               TexelIntegral& total) {
   add_up(pieces, count, total);
 }
-const AddUp add_up_here = __builtin_cpu_supports("avx2") ? add_up_with_avx2 : add_up_anywhere;
+const AddUp kAddUpHere = __builtin_cpu_supports("avx2") ? add_up_with_avx2 : add_up_anywhere;
 #else
-const AddUp add_up_here = add_up_anywhere;
+const AddUp kAddUpHere = add_up_anywhere;
 #endif
 
 }  // namespace
@@ -104,7 +104,7 @@ void BoundarySum::flush() {
   // A piece without height adds nothing.
   static const BoundaryCell kNowhere{};
   while (count_ % kLanes != 0) add(0, 0, 0, 0, kNowhere);
-  add_up_here(pieces_, count_, total_);
+  kAddUpHere(pieces_, count_, total_);
   count_ = 0;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sampling/check.h"
+#include "sampling/cross.h"
 #include "sampling/tone/tone_polygon.h"
 #include "sampling/tone_field.h"
 
@@ -10,10 +11,6 @@ namespace hilbrush {
 namespace {
 
 using Eigen::Vector2d;
-
-double cross(const Vector2d& a, const Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 }  // namespace
 

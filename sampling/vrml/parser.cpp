@@ -13,7 +13,7 @@ namespace {
 // A field and a string cost about as much memory as so many numbers.
 constexpr std::size_t kFieldCost = 24;
 constexpr std::size_t kStringCost = 8;
-constexpr std::size_t kWarningLimit = 100;
+constexpr std::size_t kParserWarningLimit = 100;
 
 bool is_interface_word(std::string_view word) {
   return word == "field" || word == "exposedField" || word == "eventIn" || word == "eventOut";
@@ -71,7 +71,7 @@ class Parser {
     throw InputError(lexer_.at(token.line), "expected " + expected + ", found " + describe(token));
   }
   void warn(int line, const std::string& sentence) {
-    if (warnings_.size() < kWarningLimit) warnings_.push_back(lexer_.at(line) + ": " + sentence);
+    if (warnings_.size() < kParserWarningLimit) warnings_.push_back(lexer_.at(line) + ": " + sentence);
   }
   void expect(char punctuation, const std::string& where) {
     if (!lexer_.peek().is(punctuation)) fail(lexer_.peek(), std::string("'") + punctuation + "' " + where);

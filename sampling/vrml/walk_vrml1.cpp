@@ -29,7 +29,7 @@ bool is_group(const std::string& type) {
 }
 
 /// VRML 1.0, Texture2Transform: scaled and turned about the centre, then moved.
-Eigen::Affine2d texture_transform_of(const Reference& node) {
+Eigen::Affine2d vrml1_texture_transform(const Reference& node) {
   const Vector2d center = vector2_of(node, "center", Vector2d::Zero());
   return Eigen::Translation2d(vector2_of(node, "translation", Vector2d::Zero()) + center) *
          Eigen::Rotation2Dd(number_of(node, "rotation", 0)) *
@@ -58,9 +58,9 @@ Parts parts_of(const Reference& node) {
   return {has("SIDES"), has("TOP"), has("BOTTOM")};
 }
 
-class Walker {
+class Vrml1Walker {
  public:
-  explicit Walker(Reading& reading) : reading_(reading) {}
+  explicit Vrml1Walker(Reading& reading) : reading_(reading) {}
 
   void walk_node(const Reference& start, State& state) {
     const Reference node = reading_.resolve(start);
@@ -130,7 +130,7 @@ class Walker {
     } else if (type == "Texture2") {
       set_texture(node, state);
     } else if (type == "Texture2Transform") {
-      state.X_uv = texture_transform_of(node);
+      state.X_uv = vrml1_texture_transform(node);
     } else if (type == "ShapeHints") {
       state.is_clockwise = word_of(node, "vertexOrdering", "UNKNOWN_ORDERING") == "CLOCKWISE";
     } else {
@@ -250,7 +250,7 @@ class Walker {
 }  // namespace
 
 void walk_vrml1(Reading& reading, const Scene& scene, const Place& place) {
-  Walker walker(reading);
+  Vrml1Walker walker(reading);
   State state;
   state.place = place;
   for (const NodePointer& root : scene.roots) walker.walk_node({root.get(), nullptr}, state);

@@ -14,7 +14,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 /// VRML97, 6.49: Tc' = -C x S x R x C x T x Tc.
-Eigen::Affine2d texture_transform_of(const Reference& node) {
+Eigen::Affine2d vrml2_texture_transform(const Reference& node) {
   const Vector2d center = vector2_of(node, "center", Vector2d::Zero());
   const Vector2d scale = vector2_of(node, "scale", Vector2d::Ones());
   const Vector2d translation = vector2_of(node, "translation", Vector2d::Zero());
@@ -22,9 +22,9 @@ Eigen::Affine2d texture_transform_of(const Reference& node) {
          Eigen::Translation2d(center + translation);
 }
 
-class Walker {
+class Vrml2Walker {
  public:
-  explicit Walker(Reading& reading) : reading_(reading) {}
+  explicit Vrml2Walker(Reading& reading) : reading_(reading) {}
 
   void walk_node(const Reference& start, const Place& outer) {
     const Reference node = reading_.resolve(start);
@@ -78,7 +78,7 @@ class Walker {
     if (const Reference texture = resolved_field(appearance, "texture")) add_texture(texture, look);
     if (look.texture >= 0)
       if (const Reference transform = resolved_field(appearance, "textureTransform"))
-        look.X_uv = texture_transform_of(transform);
+        look.X_uv = vrml2_texture_transform(transform);
     return look;
   }
 
@@ -141,7 +141,7 @@ class Walker {
 }  // namespace
 
 void walk_vrml2(Reading& reading, const Scene& scene, const Place& place) {
-  Walker walker(reading);
+  Vrml2Walker walker(reading);
   for (const NodePointer& root : scene.roots) walker.walk_node({root.get(), nullptr}, place);
 }
 

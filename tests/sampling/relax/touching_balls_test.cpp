@@ -13,11 +13,11 @@ namespace hilbrush {
 namespace {
 
 /// Balls of radii over three orders of magnitude.
-std::vector<Ball> random_balls(std::size_t count, unsigned seed) {
+std::vector<SizedBall> random_balls(std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
-  std::vector<Ball> balls(count);
-  for (Ball& ball : balls) {
+  std::vector<SizedBall> balls(count);
+  for (SizedBall& ball : balls) {
     ball.center_O = {unit(random), unit(random), unit(random) - .5};
     ball.radius_m = .2 * std::pow(10, -3 * unit(random));
   }
@@ -30,7 +30,7 @@ bool accept_odd_sums(std::uint32_t a, std::uint32_t b) {
 
 TEST(TouchingBalls, FindsWhatBruteForceFinds) {
   for (const unsigned seed : {1u, 2u, 3u}) {
-    const std::vector<Ball> balls = random_balls(700, seed);
+    const std::vector<SizedBall> balls = random_balls(700, seed);
     const IndexLists lists = find_touching_balls(balls, accept_odd_sums);
     ASSERT_EQ(lists.count(), balls.size());
     for (std::uint32_t i = 0; i < balls.size(); ++i) {
@@ -46,7 +46,7 @@ TEST(TouchingBalls, FindsWhatBruteForceFinds) {
 }
 
 TEST(TouchingBalls, SameListsForAnyNumberOfThreads) {
-  const std::vector<Ball> balls = random_balls(2000, 7);
+  const std::vector<SizedBall> balls = random_balls(2000, 7);
   std::vector<IndexLists> results;
   for (const std::size_t threads : {1u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -58,15 +58,16 @@ TEST(TouchingBalls, SameListsForAnyNumberOfThreads) {
 
 TEST(TouchingBalls, NoneAndOne) {
   EXPECT_EQ(find_touching_balls({}, accept_odd_sums).count(), 0u);
-  const std::vector<Ball> one{{Eigen::Vector3d::Zero(), 1}};
+  const std::vector<SizedBall> one{{Eigen::Vector3d::Zero(), 1}};
   EXPECT_TRUE(find_touching_balls(one, accept_odd_sums)[0].empty());
 }
 
 TEST(Colouring, StretchesOfAColourDoNotTouch) {
-  const std::vector<Ball> balls = random_balls(3000, 5);
-  std::vector<Ball> along = balls;
-  std::sort(along.begin(), along.end(), [](const Ball& a, const Ball& b) { return a.center_O.x() < b.center_O.x(); });
-  for (Ball& ball : along) ball.radius_m = .01;
+  const std::vector<SizedBall> balls = random_balls(3000, 5);
+  std::vector<SizedBall> along = balls;
+  std::sort(along.begin(), along.end(),
+            [](const SizedBall& a, const SizedBall& b) { return a.center_O.x() < b.center_O.x(); });
+  for (SizedBall& ball : along) ball.radius_m = .01;
   const IndexLists neighbours = find_touching_balls(along, [](std::uint32_t, std::uint32_t) { return true; });
   const Colouring colouring = colour_stretches(neighbours);
   const std::size_t stretch_count = (along.size() + Colouring::kStretch - 1) / Colouring::kStretch;
