@@ -39,6 +39,13 @@ std::vector<std::string> all_files() {
   return paths;
 }
 
+std::string read_text(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
 namespace {
 
 bool is_text_of_people(const std::string& path) {
@@ -52,10 +59,7 @@ std::vector<SourceFile> read_source_files() {
   std::vector<SourceFile> files;
   for (const std::string& path : all_files()) {
     if (!is_text_of_people(path)) continue;
-    std::ifstream stream(top_folder() / path, std::ios::binary);
-    std::ostringstream text;
-    text << stream.rdbuf();
-    files.push_back({path, text.str()});
+    files.push_back({path, read_text(top_folder() / path)});
   }
   return files;
 }

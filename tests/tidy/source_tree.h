@@ -17,6 +17,8 @@ struct SourceFile {
   std::vector<std::string> lines() const;
 };
 
+/// The whole of a file; empty if it can't be read.
+std::string read_text(const std::filesystem::path& file);
 /// Where the project is.
 std::filesystem::path top_folder();
 /// Whether .gitignore leaves this name at the top out: build folders and what editors drop.
