@@ -1,17 +1,14 @@
 #include "config/cell_devices.h"
 
-#include <numbers>
-
 #include "config/cell_file.h"
 #include "config/json_reader.h"
 #include "config/register_map_file.h"
+#include "planner/angles.h"
 
 namespace hilbrush {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 struct DeviceContext {
   const CellDescription& cell;

@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <vector>
 
 #include "config/json_reader.h"
+#include "planner/angles.h"
 
 namespace hilbrush {
 namespace {
 
 constexpr double kDefaultDpi = 100;
 constexpr double kMetresPerInch = 0.0254;
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::uint64_t kDotsMax = 1'000'000'000;  // what memory allows is found by the pipeline
 constexpr std::uint64_t kLevelsMax = 4;
 constexpr std::size_t kSettingsBytesMax = 64u << 10;

@@ -7,12 +7,13 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+
+#include "planner/angles.h"
 
 namespace hilbrush {
 namespace {
@@ -24,7 +25,6 @@ struct Unit {
   double si;  ///< SI units of one
 };
 
-constexpr double kDegree = std::numbers::pi / 180;
 /// Longest suffix first: _deg_s2 ends in neither _deg nor _s.
 constexpr std::array<Unit, 10> kUnits{{{"_deg_s2", kDegree},
                                        {"_mm_s2", 1e-3},

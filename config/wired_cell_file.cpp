@@ -7,9 +7,9 @@
 namespace hilbrush {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json robot_entry(const WireEndpoints& endpoints) {
+OrderedJson robot_entry(const WireEndpoints& endpoints) {
   return {{"driver", "dobot"},
           {"host", endpoints.host},
           {"dashboard_port", endpoints.dashboard_port},
@@ -17,8 +17,8 @@ Json robot_entry(const WireEndpoints& endpoints) {
           {"feedback_port", endpoints.feedback_port}};
 }
 
-Json table_entry(const WireEndpoints& endpoints) {
-  Json table{{"driver", endpoints.table_driver}};
+OrderedJson table_entry(const WireEndpoints& endpoints) {
+  OrderedJson table{{"driver", endpoints.table_driver}};
   if (!endpoints.table_map.empty()) table["map"] = endpoints.table_map;
   if (endpoints.table_serial.empty()) {
     table["host"] = endpoints.host;
@@ -31,8 +31,8 @@ Json table_entry(const WireEndpoints& endpoints) {
   return table;
 }
 
-Json laser_entry(const WireEndpoints& endpoints) {
-  Json gate{{"of", endpoints.is_gate_of_robot ? "robot" : "laser"}};
+OrderedJson laser_entry(const WireEndpoints& endpoints) {
+  OrderedJson gate{{"of", endpoints.is_gate_of_robot ? "robot" : "laser"}};
   if (endpoints.is_gate_of_robot) gate["output"] = endpoints.gate_output;
   return {{"driver", endpoints.laser_driver}, {"port", endpoints.laser_port}, {"gate", gate}};
 }
@@ -40,7 +40,7 @@ Json laser_entry(const WireEndpoints& endpoints) {
 }  // namespace
 
 std::string wired_cell_text(const std::string& cell_text, const WireEndpoints& endpoints, double time_scale) {
-  Json cell = Json::parse(cell_text, nullptr, false);
+  OrderedJson cell = OrderedJson::parse(cell_text, nullptr, false);
   if (!cell.is_object()) throw InputError("$", "is no JSON object");
   cell["devices"] = {
       {"robot", robot_entry(endpoints)}, {"table", table_entry(endpoints)}, {"laser", laser_entry(endpoints)}};

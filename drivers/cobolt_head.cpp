@@ -12,7 +12,6 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kPulseMaxS = 60;
 constexpr double kSayS = 0.05;  ///< wall: until a few bytes are taken
 constexpr unsigned long kTimerSlackNs = 1000;
 
@@ -137,7 +136,7 @@ void CoboltGate::set_listener(Listener listener) {
 }
 
 void CoboltGate::pulse(double pulse_s) {
-  if (!(pulse_s > 0) || pulse_s > kPulseMaxS) throw DriverError("the laser refuses a pulse that is no pulse");
+  if (!(pulse_s > 0) || pulse_s > kGatePulseMaxS) throw DriverError("the laser refuses a pulse that is no pulse");
   {
     const std::lock_guard lock(mutex_);
     if (is_open_) throw DriverError("the laser refuses a pulse: the last one is not over");

@@ -10,8 +10,7 @@ namespace {
 
 constexpr std::uint64_t kFramesOfGrace = 4;  ///< until a frame must show an output that was confirmed off
 constexpr std::uint64_t kOverdueMs = 16;     ///< two frames: how finely a controller may divide its time
-constexpr double kPulseMaxS = 60;
-constexpr double kImpatientS = 0.005;  ///< wall
+constexpr double kImpatientS = 0.005;        ///< wall
 
 }  // namespace
 
@@ -52,7 +51,7 @@ const char* DobotRobot::OutputGate::fault_in(const DobotFrame& frame) {
 
 void DobotRobot::OutputGate::pulse(double pulse_s) {
   const long pulse_ms = std::lround(pulse_s * 1e3);
-  if (!(pulse_s > 0) || pulse_s > kPulseMaxS || std::abs(pulse_s * 1e3 - static_cast<double>(pulse_ms)) > 1e-3 ||
+  if (!(pulse_s > 0) || pulse_s > kGatePulseMaxS || std::abs(pulse_s * 1e3 - static_cast<double>(pulse_ms)) > 1e-3 ||
       pulse_ms < 1)
     throw DriverError("the robot times pulses of whole milliseconds only");
   {

@@ -15,9 +15,7 @@ constexpr double kIdlePollS = 0.1;        ///< wall
 constexpr double kReadyPollS = 0.01;      ///< cell: an axis that drifts from its place is seen before the next dot
 constexpr double kReadyPollMinS = 0.001;  ///< wall
 constexpr double kArrivalPollS = 0.0005;  ///< wall, on top of what the exchanges take
-constexpr double kUrgentS = 0.1;          ///< wall: what a stop waits for a handshake to end
-constexpr double kLongestSettleS = 60;
-constexpr double kBoundsTolerance = 1e-9;
+constexpr double kHandshakeS = 0.1;       ///< wall: what a stop waits for a handshake to end
 
 }  // namespace
 
@@ -118,7 +116,7 @@ template <std::size_t N>
 void DriveGroup<N>::disable() noexcept {
   stop();
   try {
-    const std::unique_lock command(command_mutex_, deadline_in(kUrgentS));
+    const std::unique_lock command(command_mutex_, deadline_in(kHandshakeS));
     if (command)
       for (const auto& drive : drives_) drive->disable();
   } catch (const std::exception&) {
@@ -313,7 +311,7 @@ void DriveGroup<N>::stop() noexcept {
   ++stops_waiting_;
   std::string failure;
   try {
-    const std::unique_lock command(command_mutex_, deadline_in(kUrgentS));
+    const std::unique_lock command(command_mutex_, deadline_in(kHandshakeS));
     // A handshake that does not end is stuck on a silent drive; the others are stopped all the same.
     for (const auto& drive : drives_) {
       try {

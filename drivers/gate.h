@@ -3,6 +3,8 @@
 
 namespace hilbrush {
 
+inline constexpr double kGatePulseMaxS = 60;  ///< no gate is opened for longer
+
 /// What opens and closes the beam for one dot: a digital output of the robot's controller with the laser in external
 /// modulation, or the laser's own serial command. The pulse's end never depends on the caller being alive.
 class Gate {

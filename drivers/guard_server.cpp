@@ -22,11 +22,6 @@ constexpr double kDarkenRetryS = 0.1;
 constexpr int kDarkenAttempts = 50;  ///< on the way out
 constexpr double kLightMaxS = 120;   ///< longer than any pulse
 
-int milliseconds_until(Deadline deadline) {
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Steady::now()).count();
-  return static_cast<int>(std::clamp<long long>(left, 0, 1000));
-}
-
 }  // namespace
 
 GuardServer::GuardServer(LaserHead& head, Gate* gate, int channel, int signals, const Options& options, Clock& clock)

@@ -20,8 +20,8 @@ namespace hilbrush {
 namespace {
 
 using Steady = std::chrono::steady_clock;
-constexpr double kReplyS = 3;     ///< wall: several exchanges of the guard's with the laser
-constexpr double kUrgentS = 0.5;  ///< wall: a guard's two tries to disarm
+constexpr double kReplyS = 3;       ///< wall: several exchanges of the guard's with the laser
+constexpr double kTwoTriesS = 0.5;  ///< wall: a guard's two tries to disarm
 
 }  // namespace
 
@@ -44,7 +44,7 @@ class GuardedHead::RemoteGate final : public Gate {
         const std::lock_guard lock(head_.mutex_);
         if (is_known_off_ || head_.status_.state == DeviceState::kDisconnected) return true;
       }
-      head_.request(guard::Verb::kGateOff, 0, kUrgentS);
+      head_.request(guard::Verb::kGateOff, 0, kTwoTriesS);
       const std::lock_guard lock(head_.mutex_);
       is_known_off_ = true;
       return true;
@@ -251,7 +251,7 @@ void GuardedHead::arm() {
 
 bool GuardedHead::disarm() noexcept {
   try {
-    request(guard::Verb::kDisarm, 0, kUrgentS);
+    request(guard::Verb::kDisarm, 0, kTwoTriesS);
     return true;
   } catch (const std::exception&) {
     return false;

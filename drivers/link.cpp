@@ -17,11 +17,6 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-int milliseconds_until(Deadline deadline) {
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Steady::now()).count();
-  return static_cast<int>(std::clamp<long long>(left, 0, 3'600'000));
-}
-
 /// A hang-up on a socket must not become a signal; plain descriptors know no flags.
 ssize_t write_quietly(int fd, std::string_view bytes) {
   const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -32,6 +27,11 @@ ssize_t write_quietly(int fd, std::string_view bytes) {
 
 Deadline deadline_in(double wall_s) {
   return Steady::now() + std::chrono::ceil<Steady::duration>(std::chrono::duration<double>(std::min(wall_s, 3600.)));
+}
+
+int milliseconds_until(Deadline deadline) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Steady::now()).count();
+  return static_cast<int>(std::clamp<long long>(left, 0, 3'600'000));
 }
 
 Link::Link(int fd, std::string name) : fd_(fd), name_(std::move(name)) {

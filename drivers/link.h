@@ -20,6 +20,8 @@ struct LinkError : DriverError {
 
 using Deadline = std::chrono::steady_clock::time_point;
 Deadline deadline_in(double wall_s);
+/// For poll(): rounded up, 0 when it has passed, an hour at most.
+int milliseconds_until(Deadline deadline);
 
 class Link {
  public:

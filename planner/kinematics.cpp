@@ -5,10 +5,11 @@
 #include <limits>
 #include <numbers>
 
+#include "planner/angles.h"
+
 namespace hilbrush {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 /// The straight arm is singular: J1 and J2 would have to race for a small move along the arm.
 constexpr double kStraightGuard = 3 * std::numbers::pi / 180;
 

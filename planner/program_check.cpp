@@ -6,21 +6,20 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
-#include <numbers>
 
+#include "planner/angles.h"
 #include "planner/check/check_cell.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFocusToleranceM = 1e-9;
 constexpr double kLandingToleranceM = 10e-6;
 constexpr double kJointTolerance = 1e-9;
 constexpr double kIncidenceTolerance = 1e-5;  // rad: normals and incidences are kept in single precision
 constexpr double kEnergyTolerance = 1e-5;     // relative, for the same reason
 constexpr double kLookM = 3e-3;               // along moves, clearance is looked at this often
-constexpr std::size_t kBlock = 512;
+constexpr std::size_t kCheckBlock = 512;
 
 using Faults = std::vector<ProgramFault>;
 
@@ -278,12 +277,12 @@ std::vector<ProgramFault> check_program(const ExposureProgram& program, const st
   }
 
   // Blocks have their own lists, joined in order: the same faults for any number of threads.
-  const std::size_t count = program.exposures.size() + 1, block_count = (count + kBlock - 1) / kBlock;
+  const std::size_t count = program.exposures.size() + 1, block_count = (count + kCheckBlock - 1) / kCheckBlock;
   constexpr std::size_t kBlocksAtOnce = 16;
   for (std::size_t first = 0; first < block_count && faults.size() < limit; first += kBlocksAtOnce) {
     std::vector<Faults> found(std::min(kBlocksAtOnce, block_count - first));
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t b) {
-      const std::size_t begin = (first + b) * kBlock, end = std::min(count, begin + kBlock);
+      const std::size_t begin = (first + b) * kCheckBlock, end = std::min(count, begin + kCheckBlock);
       for (std::size_t i = begin; i < end && found[b].size() < limit; ++i) {
         if (i < program.exposures.size()) check.check_exposure(i, found[b]);
         check.check_way(i, found[b]);

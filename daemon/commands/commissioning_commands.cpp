@@ -7,7 +7,6 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 
 #include "config/cell_file.h"
@@ -16,14 +15,13 @@
 #include "daemon/commands/interrupt.h"
 #include "daemon/server/cell_devices.h"
 #include "drivers/driver_error.h"
+#include "planner/angles.h"
 
 /// What is done with a cell before a daemon drives it: look at the devices, and move one axis by a small step.
 namespace hilbrush {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// What was found at one device, and what is wrong with it.
 struct Finding {

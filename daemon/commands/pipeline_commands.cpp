@@ -103,12 +103,12 @@ int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
   return kExitOk;
 }
 
-struct Declared {
+struct DeclaredRun {
   CLI::App* app;
   std::shared_ptr<PipelineFlags> flags;
 };
 
-Declared declare(CLI::App& app, CommandContext& context, const std::string& name, const std::string& description) {
+DeclaredRun declare(CLI::App& app, CommandContext& context, const std::string& name, const std::string& description) {
   auto flags = std::make_shared<PipelineFlags>();
   flags->command = name;
   CLI::App* command = add_command(app, context, name, description);
@@ -118,7 +118,7 @@ Declared declare(CLI::App& app, CommandContext& context, const std::string& name
   return {command, flags};
 }
 
-void add_model(const Declared& declared) {
+void add_model(const DeclaredRun& declared) {
   declared.app->add_option("MODEL", declared.flags->model, "VRML, OBJ, PLY, OFF or STL file")->required();
   declared.flags->settings.add_to(*declared.app);
 }
@@ -130,7 +130,7 @@ void add_pipeline_commands(CLI::App& app, CommandContext& context) {
                     "plan a model, paint it on the simulated cell and show the pictures; needs no daemon"));
   add_model(declare(app, context, "plan", "make dots and exposure program of a model, without painting"));
 
-  const Declared develop = declare(app, context, "develop", "develop the film from what a simulated cell recorded");
+  const DeclaredRun develop = declare(app, context, "develop", "develop the film from what a simulated cell recorded");
   add_model(develop);
   develop.app
       ->add_option("--program", develop.flags->program,
@@ -138,7 +138,7 @@ void add_pipeline_commands(CLI::App& app, CommandContext& context) {
       ->required();
   develop.app->add_option("--emissions", develop.flags->emissions, "the record of what the laser did")->required();
 
-  const Declared calibrate = declare(
+  const DeclaredRun calibrate = declare(
       app, context, "calibrate", "make a tone curve from a grey wedge: on the simulated cell, or painted and measured");
   auto* measured = calibrate.app->add_option("--measured", calibrate.flags->measured,
                                              "the wedge_steps.json of a painted wedge, with its readings filled in");

@@ -21,7 +21,7 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+constexpr auto kTellInterval = std::chrono::milliseconds(100);
 constexpr double kAtRest = 1e-6;  ///< rad or m: the axes are still where the approach begins
 
 /// The job's own files are to blame.
@@ -338,7 +338,7 @@ void CellThread::paint(std::vector<Joints> approach, std::function<void(std::siz
           result = execute(loaded_->program, approach, cell_, description_, loaded_->journal, control_,
                            [&](std::size_t exposed) {
                              const auto time = Steady::now();
-                             if (time - last_told < kProgressInterval) return;
+                             if (time - last_told < kTellInterval) return;
                              last_told = time;
                              post_([on_progress, exposed] { on_progress(exposed); });
                            });

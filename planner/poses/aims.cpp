@@ -6,17 +6,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "planner/angles.h"
 #include "planner/reach/beam_directions.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kUnservedS = .25;  // what a dot costs that no aim serves
 constexpr std::size_t kAimsAtMost = 2000;
-constexpr std::size_t kBlock = 1 << 12;  // dots whose aims are chosen together
+constexpr std::size_t kAimBlock = 1 << 12;  // dots whose aims are chosen together
 constexpr std::size_t kBlocksAtOnce = 16;
 constexpr int kExchangeRounds = 2;
 
@@ -238,12 +237,12 @@ Aims choose_aims(const AimedDots& dots, const AimCosts& costs, const Progress& p
   Aims aims;
   aims.beams_O = AimLocation(dots, costs).solve(part_of(progress, 0, .5));
   aims.of_dot.assign(dots.size(), kNoAim);
-  const std::size_t block_count = (dots.size() + kBlock - 1) / kBlock;
+  const std::size_t block_count = (dots.size() + kAimBlock - 1) / kAimBlock;
   const Progress told = part_of(progress, .5, 1);
   for (std::size_t first = 0; first < block_count; first += kBlocksAtOnce) {
     tbb::parallel_for(first, std::min(first + kBlocksAtOnce, block_count), [&](std::size_t b) {
-      const std::size_t end = std::min(dots.size(), (b + 1) * kBlock);
-      BlockOfAims(dots, costs, aims.beams_O).choose(b * kBlock, end, aims.of_dot.data());
+      const std::size_t end = std::min(dots.size(), (b + 1) * kAimBlock);
+      BlockOfAims(dots, costs, aims.beams_O).choose(b * kAimBlock, end, aims.of_dot.data());
     });
     told(static_cast<double>(std::min(first + kBlocksAtOnce, block_count)) / static_cast<double>(block_count));
   }

@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kNeighbours = 8;
 constexpr std::int64_t kWindow = 5000;  // places that one move may shift or reverse
 constexpr std::int64_t kKickWindow = 1000;
-constexpr std::size_t kBlock = 1 << 15;  // dots that are improved together
-constexpr std::int32_t kNone = -1;       // beyond an end of the path
+constexpr std::size_t kTourBlock = 1 << 15;  // dots that are improved together
+constexpr std::int32_t kNone = -1;           // beyond an end of the path
 constexpr float kLeastGainS = 1e-6F;
 /// What turning the tool saves a step is not always to be had, because turns add up.
 constexpr float kHopedFor = .7F;
@@ -304,7 +304,7 @@ std::vector<std::uint32_t> improved_order(const CellDescription& cell, std::span
                                           std::size_t kicks) {
   std::vector<std::uint32_t> order;
   order.reserve(path.size());
-  const std::size_t block_count = (path.size() + kBlock - 1) / kBlock;
+  const std::size_t block_count = (path.size() + kTourBlock - 1) / kTourBlock;
   for (std::size_t b = 0; b < block_count; ++b) {
     const std::size_t begin = b * path.size() / block_count, end = (b + 1) * path.size() / block_count;
     if (end - begin < 3) {

@@ -14,7 +14,7 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kBlock = 8192;  // dots whose ways are looked for at once
+constexpr std::size_t kWayBlock = 8192;  // dots whose ways are looked for at once
 
 constexpr std::size_t kSearchesFailed = 30;
 constexpr const char* kNoWay = "no clear way leads to a pose for it";
@@ -136,9 +136,9 @@ void build_program(const Reach::Implementation& reach, const DotSequence& dots, 
   const std::size_t count = posed.sequence.size();
   plan.program.exposures.reserve(count);
   ProgramBuilder builder(reach, dots, plan);
-  for (std::size_t first = 0; first < count; first += kBlock) {
-    builder.add_block(posed.sequence.data() + first, std::min(kBlock, count - first));
-    if (progress) progress(static_cast<double>(std::min(count, first + kBlock)) / static_cast<double>(count));
+  for (std::size_t first = 0; first < count; first += kWayBlock) {
+    builder.add_block(posed.sequence.data() + first, std::min(kWayBlock, count - first));
+    if (progress) progress(static_cast<double>(std::min(count, first + kWayBlock)) / static_cast<double>(count));
   }
   builder.add_stranded();
   builder.go_home();

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "planner/angles.h"
 #include "planner/poses/step_cost.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kWidest = 8 * kDegree;  // that the tool turns away from the station's yaw
 constexpr int kFinePerCoarse = 4;
 constexpr int kMostToOneSide = 127;   // what back-pointers of a byte tell apart

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "planner/angles.h"
 #include "planner/reach/reach_failure.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 /// Against rounding of normals to single precision, so that no exposure exceeds the limit by an ulp.
 constexpr double kIncidenceGuard = 1e-4;
 constexpr double kTiltStep = 7.5 * kDegree, kFineTiltStep = 2.5 * kDegree;

@@ -2,12 +2,11 @@
 
 #include <array>
 #include <cstdio>
-#include <numbers>
+
+#include "planner/angles.h"
 
 namespace hilbrush {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// Two digits, and all of those before the point.
 std::string number(double value) {

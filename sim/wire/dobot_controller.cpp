@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <numbers>
 
+#include "sim/wire/read_number.h"
+
 namespace hilbrush {
 namespace {
 
@@ -17,10 +19,6 @@ std::string answered(int error, const std::string& values = {}) {
   return std::to_string(error) + ",{" + values + "},";
 }
 
-bool read_number(const std::string& text, double& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
-}
 bool read_integer(const std::string& text, int& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size();

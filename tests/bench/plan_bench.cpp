@@ -15,12 +15,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include "config/cell_file.h"
 #include "config/job_settings.h"
+#include "planner/angles.h"
 #include "planner/plan.h"
 #include "planner/poses/posed_dots.h"
 #include "planner/program_check.h"
@@ -38,8 +38,6 @@
 namespace {
 
 using namespace hilbrush;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 struct Row {
   const char* name;

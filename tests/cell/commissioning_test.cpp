@@ -9,8 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
+#include "planner/angles.h"
 #include "sim/devices/emission_record.h"
 #include "tests/cell/wired_world.h"
 #include "tests/daemon/daemon_process.h"
@@ -177,7 +177,6 @@ TEST_F(CheckCell, ACellThatADaemonDrivesIsLeftAlone) {
 /// Scaled time; the truth is at hand.
 class Jog : public testing::Test {
  protected:
-  static constexpr double kDegree = std::numbers::pi / 180;
   CommandResult jog(const std::string& arguments) {
     return hilbrush("jog " + arguments + " --cell " + quoted(world.cell_file().string()));
   }

@@ -5,11 +5,11 @@
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <sstream>
 
 #include "config/cell_file.h"
 #include "config/register_map_file.h"
+#include "planner/angles.h"
 #include "sampling/input_error.h"
 
 namespace hilbrush {
@@ -59,7 +59,6 @@ TEST(CellDevices, RealDevicesAreReadInTheCellsUnits) {
   EXPECT_EQ(dobot.host, "10.0.0.6");
   EXPECT_EQ(dobot.dashboard_port, 29999);
   EXPECT_EQ(dobot.motion_port, 3);
-  constexpr double kDegree = std::numbers::pi / 180;
   EXPECT_NEAR(dobot.scales[0].to_device(91 * kDegree), -1, 1e-12);
   EXPECT_NEAR(dobot.scales[0].to_ours(-1), 91 * kDegree, 1e-12);
   EXPECT_NEAR(dobot.scales[2].to_device(.0125), 2.5, 1e-12);

@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "config/json_reader.h"
+#include "planner/angles.h"
 #include "planner/sha256.h"
 
 namespace hilbrush {
@@ -16,8 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 fs::path shipped(const std::string& name) {
   return fs::path(HILBRUSH_SOURCE_DIR) / "config" / "cells" / (name + ".json");
@@ -63,6 +61,13 @@ std::vector<Json::json_pointer> default_keys() {
   return keys;
 }
 
+/// Without those that may be left out, or be null: they have tests of their own.
+std::vector<Json::json_pointer> required_keys() {
+  std::vector<Json::json_pointer> keys = default_keys();
+  std::erase_if(keys, [](const Json::json_pointer& key) { return key.to_string().starts_with("/arm/column_"); });
+  return keys;
+}
+
 TEST(CellFile, TheDefaultCellHasTheLimitsThatPlanningWasMeasuredWith) {
   const CellDescription cell = load_cell(find_cell("default"));
   EXPECT_EQ(cell.name, "default");
@@ -102,7 +107,7 @@ TEST(CellFile, HomeOfEveryShippedCellIsWithinWhatPlanningMayUse) {
 
 TEST(CellFile, EveryRemovedKeyIsMissedByItsPath) {
   const Json whole = Json::parse(default_text());
-  for (const Json::json_pointer& key : default_keys()) {
+  for (const Json::json_pointer& key : required_keys()) {
     Json json = whole;
     json[key.parent_pointer()].erase(key.back());
     const Refusal refusal = refusal_of(json);
@@ -113,7 +118,7 @@ TEST(CellFile, EveryRemovedKeyIsMissedByItsPath) {
 
 TEST(CellFile, EveryRenamedKeyIsMissedByItsPathAndTheOtherNameIsFound) {
   const Json whole = Json::parse(default_text());
-  for (const Json::json_pointer& key : default_keys()) {
+  for (const Json::json_pointer& key : required_keys()) {
     Json json = whole;
     const Json value = json[key];
     json[key.parent_pointer()].erase(key.back());
@@ -125,7 +130,7 @@ TEST(CellFile, EveryRenamedKeyIsMissedByItsPathAndTheOtherNameIsFound) {
 
 TEST(CellFile, EveryKeyOfAnotherTypeIsRefused) {
   const Json whole = Json::parse(default_text());
-  for (const Json::json_pointer& key : default_keys()) {
+  for (const Json::json_pointer& key : required_keys()) {
     for (const Json& wrong : {Json(nullptr), Json(true), Json(Json::array({"x"}))}) {
       Json json = whole;
       json[key] = wrong;

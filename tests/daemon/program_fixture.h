@@ -6,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include "planner/angles.h"
 #include "planner/cell_description.h"
 #include "planner/exposure_program.h"
 #include "tests/support/temporary_folder.h"
@@ -14,7 +15,6 @@
 namespace hilbrush::test {
 
 inline CellDescription small_cell(double time_scale = 0) {
-  constexpr double kDegree = std::numbers::pi / 180;
   CellDescription cell;
   cell.name = "small";
   cell.sha256 = std::string(64, 'c');

@@ -99,7 +99,7 @@ inline std::string bytes_of(const std::filesystem::path& file) {
 inline Playground::Playground() {
   std::filesystem::create_directories(folder_);
   for (const auto& entry :
-       std::filesystem::directory_iterator(std::filesystem::path(__FILE__).parent_path() / "corpus" / "models")) {
+       std::filesystem::directory_iterator(std::filesystem::path(HILBRUSH_SOURCE_DIR) / "tests/fuzz/corpus/models")) {
     models_[entry.path().filename().string()] = bytes_of(entry.path());
     std::filesystem::copy_file(entry.path(), folder_ / entry.path().filename());
   }

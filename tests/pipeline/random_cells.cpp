@@ -6,12 +6,11 @@
 #include <random>
 
 #include "config/cell_file.h"
+#include "planner/angles.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush::testing_pipeline {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 class Dice {
  public:

@@ -2,12 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
+#include "planner/angles.h"
 
 namespace hilbrush {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 SkippedDot tilt(double excess_deg) {
   return {0, SkipReason::kIncidence, "x", "tilt past its limit", excess_deg * kDegree, true};

@@ -5,8 +5,8 @@
 
 #include <cmath>
 #include <cstring>
-#include <numbers>
 
+#include "planner/angles.h"
 #include "planner/check/check_cell.h"
 #include "planner/dose.h"
 #include "planner/program_check.h"
@@ -18,8 +18,6 @@
 
 namespace hilbrush {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// What several tests look at, planned once.
 struct PlannedBall {

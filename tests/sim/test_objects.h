@@ -3,6 +3,7 @@
 #include <numbers>
 #include <vector>
 
+#include "planner/angles.h"
 #include "planner/cell_description.h"
 #include "sampling/textured_mesh.h"
 #include "sim/devices/emission_record.h"
@@ -13,10 +14,9 @@ namespace hilbrush::test {
 inline CellDescription small_cell() {
   CellDescription cell;
   cell.name = "test";
-  constexpr double kDegree = std::numbers::pi / 180;
   const AxisDescription turn{-180 * kDegree, 180 * kDegree, 720 * kDegree, 8000 * kDegree, 10 * kDegree, 0};
   cell.axes = {turn, turn, {-.1, .4, 1.1, 18, .02, .2}, turn, turn, turn};
-  cell.arm = {.225, .175, 30 * kDegree, .1, .015, .25, {}, {}};
+  cell.arm = {.225, .175, 30 * kDegree, .1, .015, .25, {}, {}, {}};
   cell.lens = {.015, .06, .14};
   cell.table.tilt_axis_W = {.26, 0, .05};
   cell.table.plate_height_m = .01;

@@ -20,10 +20,11 @@ struct LibraryRule {
 // What is plain enough for everybody below daemon/: options and nouns of std and Eigen only.
 constexpr const char* kOptionHeaders =
     "sim/wire/(fault_script|cell_phase|endpoints)\\.h|sampling/(sample_options|tone|input_error|check)\\.h|planner/"
-    "(plan_options|mounting_options|cell_description|sha256)\\.h|"
+    "(angles|plan_options|mounting_options|cell_description|sha256)\\.h|"
     "drivers/device_options\\.h";
 constexpr const char* kCellModelHeaders =
-    "planner/(cell_description|exposure_program|program_file|sha256|time_model|plan_options|mounting_options)\\.h";
+    "planner/(angles|cell_description|exposure_program|program_file|sha256|time_model|plan_options|"
+    "mounting_options)\\.h";
 constexpr const char* kPosix =
     "(unistd|fcntl|poll|netdb|sched|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)/"
     "[a-z_]+\\.h";
@@ -46,9 +47,10 @@ const LibraryRule kRules[]{
     // The light half of daemon/: starts in milliseconds, never sees a mesh or an image.
     {"light programs",
      "daemon/(server|commands)/.*|daemon/"
-     "(executor|journal|journal_storage|duration_histogram|program_limits|hilbrush_main|"
+     "(executor|journal|journal_storage|duration_histogram|motion_times|program_limits|hilbrush_main|"
      "hilbrushd_main)\\.(h|cpp)",
-     "daemon/(server|commands)/.*|daemon/(executor|journal|journal_storage|duration_histogram|program_limits)\\.h|"
+     "daemon/(server|commands)/.*|daemon/"
+     "(executor|journal|journal_storage|duration_histogram|motion_times|program_limits)\\.h|"
      "config/.*|drivers/.*|sim/devices/.*",
      ".*"},
     {"daemon", "daemon/.*", "(daemon|config|drivers|sim|planner|sampling)/.*", ".*"},

@@ -6,16 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <numbers>
 #include <random>
 
+#include "planner/angles.h"
 #include "planner/program_check.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 struct PlannedCup {
   CellDescription cell = default_cell();

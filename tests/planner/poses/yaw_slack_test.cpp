@@ -8,13 +8,14 @@
 #include <numeric>
 #include <vector>
 
+#include "planner/angles.h"
 #include "planner/poses/step_cost.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180, kNominal = 5 * kDegree;
+constexpr double kNominal = 5 * kDegree;
 
 /// Rows back and forth on the top of a block, level when the table is tilted to meet the beam.
 struct Rows {

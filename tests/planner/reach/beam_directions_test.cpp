@@ -4,16 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "planner/angles.h"
 #include "planner/check/check_cell.h"
 #include "tests/planner/reach/ray_bundle.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 TEST(BeamDirections, LieEvenlyOverTheSphere) {
   const double spacing = 6 * kDegree;

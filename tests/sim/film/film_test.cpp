@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "planner/angles.h"
 #include "sim/film/beam.h"
 #include "tests/sim/test_objects.h"
 
@@ -16,7 +17,6 @@ using test::square;
 using test::visit_surface;
 
 constexpr double kPitch = .254e-3;
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// Joints whose beam has its focus at p_O and travels along direction_W's yaw, with the table level: solved here from
 /// the frame comment.

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <numbers>
 #include <random>
 
+#include "planner/angles.h"
 #include "tests/sim/wire/wire_world.h"
 
 namespace hilbrush {
@@ -13,8 +13,6 @@ using test::from_hex;
 using test::to_hex;
 using test::WireWorld;
 using test::with_crc;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// Without the checksum, or "bad" if it does not fit.
 std::string body(const std::string& frame) {
