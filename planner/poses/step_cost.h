@@ -83,14 +83,21 @@ class StepCost {
         cruising_s = std::max(cruising_s, distance * inverse_speed_[i] + ramp_s_[i]);
     }
     float move_s = std::max(cruising_s, 2 * std::sqrt(ramping));
-    if (tick_s_ > 0) move_s = std::ceil(move_s / tick_s_ - 1e-4F) * tick_s_;
+    if (tick_s_ > 0) move_s = whole_ticks(move_s / tick_s_ - 1e-4F) * tick_s_;
     return move_s + settle_span_s_ * std::min(1.F, share);
+  }
+
+  /// std::ceil of what is over -1 and far below the largest int, which without SSE 4.1 is a call.
+  static float whole_ticks(float ticks) {
+    const auto begun = static_cast<float>(static_cast<int>(ticks));
+    return begun < ticks ? begun + 1 : begun;
   }
 
   /// Where the largest of |at + slope * x| is least: two of them are equal there.
   static float least_maximum(const std::array<float, 3>& at, const std::array<float, 3>& slope) {
     const auto largest = [&](float x) {
-      return std::max({std::abs(at[0] + slope[0] * x), std::abs(at[1] + slope[1] * x), std::abs(at[2] + slope[2] * x)});
+      return std::max(std::abs(at[0] + slope[0] * x),
+                      std::max(std::abs(at[1] + slope[1] * x), std::abs(at[2] + slope[2] * x)));
     };
     float best = 0, least = largest(0);
     const auto consider = [&](float difference, float slope_difference) {
