@@ -53,7 +53,7 @@ case $verb in
     case $name in
       hang*) sleep 600 ;;
       crash*) kill -SEGV $$ ;;
-      fat*) x=$(head -c 300000000 /dev/zero | tr '\0' 'a'); sleep 600 ;;
+      fat*) exec awk 'BEGIN { s = "a"; while (length(s) < 4e8) s = s s; while (1) ; }' ;;
       bad*) echo '{"error":{"at":"bad.wrl:12","message":"a face has no corners"}}'; exit 3 ;;
       mute*) echo 'out of luck' >&2; exit 1 ;;
       garbage*) echo 'this is no JSON'; sleep 600 ;;
