@@ -66,6 +66,14 @@ TEST(Clearance, FieldAgreesWithABundleOfRays) {
   EXPECT_GT(touching, looks / 20);
 }
 
+/// Anywhere within the axes' limits.
+Joints any_joints(const CellDescription& cell, std::mt19937& random) {
+  Joints joints;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    joints[axis] = std::uniform_real_distribution<double>(cell.axes[axis].min, cell.axes[axis].max)(random);
+  return joints;
+}
+
 /// Both codes see the same links: where planning keeps its margin, the check finds nothing, and where the check finds
 /// a link touching, planning does.
 TEST(Clearance, LinksAgreeWithTheIndependentCheck) {
@@ -80,9 +88,7 @@ TEST(Clearance, LinksAgreeWithTheIndependentCheck) {
   std::mt19937 random(kSeed);
   std::size_t touching = 0, clear = 0;
   for (int n = 0; n < 20'000; ++n) {
-    Joints joints;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      joints[axis] = std::uniform_real_distribution<double>(cell.axes[axis].min, cell.axes[axis].max)(random);
+    Joints joints = any_joints(cell, random);
     joints[kJ3] = std::min(joints[kJ3], .2);
     const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
     const bool is_clear = clearance.links_obstruction(table, joints) == Obstruction::kNone;
@@ -114,9 +120,7 @@ TEST(Clearance, TheColumnAgreesWithTheIndependentCheck) {
   std::mt19937 random(kSeed);
   std::size_t tool = 0, table = 0, clear = 0;
   for (int n = 0; n < 20'000; ++n) {
-    Joints joints;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      joints[axis] = std::uniform_real_distribution<double>(cell.axes[axis].min, cell.axes[axis].max)(random);
+    Joints joints = any_joints(cell, random);
     joints[kTilt] = std::max(joints[kTilt], .8);  // the ball leans towards the robot
     const TablePose pose = kinematics.table_pose(joints[kTilt], joints[kRotation]);
     const bool is_clear = clearance.links_obstruction(pose, joints) == Obstruction::kNone;
