@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <random>
 
@@ -22,10 +23,10 @@ class PathCost {
  public:
   PathCost(const CellDescription& cell, std::span<const PathDot> path) : path_(path), step_(cell) {}
 
-  float operator()(std::int32_t a, std::int32_t b) const {
+  float operator()(std::int32_t a, std::int32_t b, float enough_s = std::numeric_limits<float>::infinity()) const {
     if (a == kNone || b == kNone) return 0;
     const PathDot &from = path_[static_cast<std::size_t>(a)], &to = path_[static_cast<std::size_t>(b)];
-    return step_.with_turn(from.arm, to.arm, from.per_yaw, to.per_yaw, kHopedFor);
+    return step_.with_turn(from.arm, to.arm, from.per_yaw, to.per_yaw, kHopedFor, enough_s);
   }
 
  private:
@@ -33,10 +34,15 @@ class PathCost {
   StepCost step_;
 };
 
+struct Neighbour {
+  std::int32_t dot;
+  float step_s;  ///< what going there costs, asked for too often to be worked out each time
+};
+
 /// The nearest dots of each dot, by a hash-free grid: dots sorted by cell.
 class Neighbours {
  public:
-  explicit Neighbours(std::span<const PathDot> path) : path_(path) {
+  Neighbours(std::span<const PathDot> path, const PathCost& cost) : path_(path) {
     const std::size_t n = path.size();
     Eigen::Array3f low = path[0].position_O.array(), high = low;
     std::vector<float> steps;
@@ -60,10 +66,10 @@ class Neighbours {
     });
     keys_.resize(n);
     for (std::size_t i = 0; i < n; ++i) keys_[i] = keys[static_cast<std::size_t>(order_[i])];
-    find_all();
+    find_all(cost);
   }
 
-  std::span<const std::int32_t> of(std::int32_t dot) const {
+  std::span<const Neighbour> of(std::int32_t dot) const {
     const std::size_t i = static_cast<std::size_t>(dot);
     return {near_.data() + first_[i], first_[i + 1] - first_[i]};
   }
@@ -75,7 +81,7 @@ class Neighbours {
   }
   std::int64_t key(const Cell& cell) const { return (cell[2] * count_[1] + cell[1]) * count_[0] + cell[0]; }
 
-  void find_all() {
+  void find_all(const PathCost& cost) {
     const std::size_t n = path_.size();
     first_.assign(1, 0);
     near_.reserve(n * kNeighbours);
@@ -85,7 +91,8 @@ class Neighbours {
       collect(i, found);
       const std::size_t kept = std::min(kNeighbours, found.size());
       std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end());
-      for (std::size_t k = 0; k < kept; ++k) near_.push_back(found[k].second);
+      for (std::size_t k = 0; k < kept; ++k)
+        near_.push_back({found[k].second, cost(static_cast<std::int32_t>(i), found[k].second)});
       first_.push_back(near_.size());
     }
   }
@@ -116,7 +123,7 @@ class Neighbours {
   std::vector<std::int32_t> order_;  ///< dots by cell
   std::vector<std::int64_t> keys_;   ///< of the cells of order_
   std::vector<std::size_t> first_;
-  std::vector<std::int32_t> near_;
+  std::vector<Neighbour> near_;
 };
 
 /// The path as an array of dots, and its local improvement. Whatever is done to the path is done by reversing stretches
@@ -125,7 +132,7 @@ class LocalSearch {
  public:
   LocalSearch(const CellDescription& cell, std::span<const PathDot> path)
       : cost_(cell, path),
-        neighbours_(path),
+        neighbours_(path, cost_),
         dot_at_(path.size()),
         place_of_(path.size()),
         is_queued_(path.size(), false) {
@@ -172,6 +179,13 @@ class LocalSearch {
     return place < 0 || place >= static_cast<std::int64_t>(dot_at_.size()) ? kNone
                                                                            : dot_at_[static_cast<std::size_t>(place)];
   }
+  /// Of an edge of the path, which mostly joins neighbours.
+  float edge_s(std::int32_t a, std::int32_t b) const {
+    if (a == kNone || b == kNone) return 0;
+    for (const Neighbour& near : neighbours_.of(a))
+      if (near.dot == b) return near.step_s;
+    return cost_(a, b);
+  }
   void queue_again(std::int32_t dot) {
     if (dot == kNone || is_queued_[static_cast<std::size_t>(dot)]) return;
     is_queued_[static_cast<std::size_t>(dot)] = true;
@@ -195,12 +209,12 @@ class LocalSearch {
   bool two_opt(std::int32_t a) {
     for (const std::int64_t side : {1, -1}) {
       const std::int32_t b = at(place(a) + side);
-      const float edge_s = cost_(a, b);
-      for (const std::int32_t c : neighbours_.of(a)) {
-        const float new_s = cost_(a, c);
-        if (new_s >= edge_s) continue;
+      const float old_s = edge_s(a, b);
+      for (const auto& [c, new_s] : neighbours_.of(a)) {
+        if (new_s >= old_s) continue;
         const std::int32_t d = at(place(c) + side);
-        const float gain_s = edge_s + cost_(c, d) - new_s - cost_(b, d);
+        const float saved_s = old_s + edge_s(c, d) - new_s;
+        const float gain_s = saved_s - cost_(b, d, saved_s);
         if (gain_s <= kLeastGainS) continue;
         const std::int64_t first = side > 0 ? std::min(place(a), place(c)) + 1 : std::min(place(a), place(c));
         const std::int64_t last = side > 0 ? std::max(place(a), place(c)) : std::max(place(a), place(c)) - 1;
@@ -227,17 +241,16 @@ class LocalSearch {
 
   bool move_segment(std::int32_t a, std::int32_t e, std::int64_t side, std::int64_t length) {
     const std::int32_t before = at(place(a) - side), after = at(place(e) + side);
-    const float removed_s = cost_(before, a) + cost_(e, after) - cost_(before, after);
+    const float old_s = edge_s(before, a) + edge_s(e, after), removed_s = old_s - cost_(before, after, old_s);
     if (removed_s <= kLeastGainS) return false;
-    for (const std::int32_t c : neighbours_.of(a)) {
+    for (const auto& [c, joint_s] : neighbours_.of(a)) {
+      if (joint_s >= removed_s) continue;
       const std::int64_t offset = (place(c) - place(a)) * side;
       if ((offset >= 0 && offset < length) || std::abs(offset) >= window_) continue;
-      const float joint_s = cost_(c, a);
-      if (joint_s >= removed_s) continue;
       for (const std::int64_t beyond : {1, -1}) {
         const std::int32_t d = at(place(c) + beyond);
         if (d == a || d == e) continue;  // the edge that is taken away
-        const float gain_s = removed_s + cost_(c, d) - joint_s - cost_(e, d);
+        const float saved_s = removed_s + edge_s(c, d) - joint_s, gain_s = saved_s - cost_(e, d, saved_s);
         if (gain_s <= kLeastGainS) continue;
         insert(a, e, c, beyond);
         gained_s_ += gain_s;

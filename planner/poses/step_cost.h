@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "planner/kinematics.h"
 
@@ -38,13 +39,18 @@ class StepCost {
 
   /// The same if the tool turns a little on the way, by as much as serves the step best: J1, J2 and J4 then share what
   /// would be the first two's alone. `per_yaw`: how the joints follow the yaw at either end. Symmetric.
-  /// `share` of what that saves is taken off.
+  /// `share` of what that saves is taken off. From `enough_s` on the answer may be anything that is no less and no more
+  /// than the cost: most of those who ask only want to know whether a step is cheaper than another, and a bound does.
   float with_turn(const ArmJoints& from, const ArmJoints& to, const ArmJoints& from_per_yaw,
-                  const ArmJoints& to_per_yaw, float share = 1) const {
+                  const ArmJoints& to_per_yaw, float share = 1,
+                  float enough_s = std::numeric_limits<float>::infinity()) const {
     const ArmJoints step = difference(from, to);
     const float plain_s = cost_s(step);
     // One tick is the least; and no turn helps J3.
-    if (plain_s <= std::max(1.5F * tick_s_, axis_s(2, std::abs(step[2])))) return plain_s;
+    const float least_s = std::max(tick_s_, axis_s(2, std::abs(step[2])));
+    if (plain_s <= std::max(1.5F * tick_s_, least_s)) return plain_s;
+    const float bound_s = plain_s - share * (plain_s - least_s);
+    if (bound_s >= enough_s) return bound_s;
     std::array<float, 3> at, slope;
     ArmJoints rate{};
     for (std::size_t k = 0; k < 3; ++k) {
