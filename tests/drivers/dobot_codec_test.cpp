@@ -6,6 +6,8 @@
 #include <cstring>
 #include <limits>
 
+#include "tests/drivers/dobot_peer.h"
+
 /// Pinned to the words of the manual "TCP_IP Remote Control Interface Guide (4axis)".
 namespace hilbrush {
 namespace {
@@ -54,21 +56,16 @@ TEST(DobotCodec, AnEchoIsRecognisedWithoutRegardToCase) {
   EXPECT_FALSE(is_dobot_echo("", "Sync()"));
 }
 
-/// A packet as the manual's table of offsets has it.
 std::string packet(std::uint64_t time_ms, double first_joint = 12.5) {
-  std::string bytes(kDobotFrameBytes, '\0');
-  const auto put = [&](std::size_t at, const auto& value) { std::memcpy(bytes.data() + at, &value, sizeof value); };
-  put(0, std::uint16_t{1440});
-  put(16, std::uint64_t{0b101});
-  put(24, std::uint64_t{5});
-  put(32, time_ms);
-  put(48, std::uint64_t{0x0123456789ABCDEF});
-  put(192, first_joint);
-  put(432, first_joint + 1);
-  put(480, -3.25);
-  put(1026, std::uint8_t{1});
-  put(1029, std::uint8_t{1});
-  return bytes;
+  DobotFrame frame;
+  frame.digital_outputs = 0b101;
+  frame.mode = DobotMode::kEnabled;
+  frame.time_ms = time_ms;
+  frame.setpoint[0] = first_joint;
+  frame.actual[0] = first_joint + 1;
+  frame.speed[0] = -3.25;
+  frame.is_enabled = frame.has_error = true;
+  return test::dobot_packet(frame);
 }
 
 TEST(DobotCodec, FramesAreReadAtTheirOffsets) {

@@ -1,20 +1,16 @@
 #pragma once
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <array>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <map>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "tests/drivers/loopback.h"
 
 namespace hilbrush::test {
 
@@ -25,28 +21,18 @@ class ModbusPeer {
   using Registers = std::map<int, std::uint16_t>;
 
   explicit ModbusPeer(std::function<void(Registers&)> obey) : obey_(std::move(obey)) {
-    listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in at{};
-    at.sin_family = AF_INET;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof at;
-    if (::bind(listener_, reinterpret_cast<sockaddr*>(&at), size) != 0 || ::listen(listener_, 4) != 0 ||
-        ::getsockname(listener_, reinterpret_cast<sockaddr*>(&at), &size) != 0)
-      throw std::runtime_error("no port for a Modbus peer");
-    port_ = ntohs(at.sin_port);
     thread_ = std::thread([this] { serve(); });
   }
   ~ModbusPeer() {
-    ::shutdown(listener_, SHUT_RDWR);
+    port_.shut();
     {
       const std::lock_guard lock(mutex_);
       if (connection_ >= 0) ::shutdown(connection_, SHUT_RDWR);
     }
     thread_.join();
-    ::close(listener_);
   }
 
-  std::uint16_t port() const { return port_; }
+  std::uint16_t port() const { return port_.number(); }
   void set(int unit, int address, std::uint16_t word) {
     const std::lock_guard lock(mutex_);
     units_[unit][address] = word;
@@ -70,7 +56,7 @@ class ModbusPeer {
  private:
   void serve() {
     for (;;) {
-      const int connection = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
+      const int connection = port_.accept();
       if (connection < 0) return;
       {
         const std::lock_guard lock(mutex_);
@@ -137,8 +123,7 @@ class ModbusPeer {
   }
 
   const std::function<void(Registers&)> obey_;
-  int listener_ = -1;
-  std::uint16_t port_ = 0;
+  LoopbackPort port_;
   std::mutex mutex_;  ///< of what follows
   int connection_ = -1, silent_writes_ = 0;
   std::size_t reads_since_write_ = 0;

@@ -1,0 +1,116 @@
+#pragma once
+#include <array>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "drivers/dobot_codec.h"
+#include "tests/drivers/loopback.h"
+
+namespace hilbrush::test {
+
+/// A feedback packet as the manual's table of offsets has it.
+inline std::string dobot_packet(const DobotFrame& frame) {
+  std::string bytes(kDobotFrameBytes, '\0');
+  const auto put = [&](std::size_t at, const auto& value) { std::memcpy(bytes.data() + at, &value, sizeof value); };
+  put(0, std::uint16_t{1440});
+  put(16, frame.digital_outputs);
+  put(24, static_cast<std::uint64_t>(frame.mode));
+  put(32, frame.time_ms);
+  put(48, std::uint64_t{0x0123456789ABCDEF});
+  put(192, frame.setpoint);
+  put(432, frame.actual);
+  put(480, frame.speed);
+  put(1026, std::uint8_t{frame.is_enabled});
+  put(1028, std::uint8_t{frame.is_running});
+  put(1029, std::uint8_t{frame.has_error});
+  return bytes;
+}
+
+/// A Dobot controller that does nothing by itself: it takes all it is told, and shows the frames it is given.
+class DobotPeer {
+ public:
+  ~DobotPeer() {
+    for (Port* port : {&dashboard_, &motion_, &feedback_}) port->end();
+  }
+
+  std::uint16_t dashboard_port() const { return dashboard_.number(); }
+  std::uint16_t motion_port() const { return motion_.number(); }
+  std::uint16_t feedback_port() const { return feedback_.number(); }
+
+  /// To whoever listens to the feedback; waits until somebody does.
+  void show(const DobotFrame& frame) {
+    while (!feedback_.send(dobot_packet(frame))) std::this_thread::yield();
+  }
+  /// The queue has come to the Sync of a pulse.
+  void finish_pulse() { motion_.send("0,{},Sync();"); }
+  /// What the dashboard was told since the last call.
+  std::vector<std::string> take_orders() { return dashboard_.take(); }
+
+ private:
+  /// Serves one connection after another, and answers each command but those that are `kept`.
+  class Port {
+   public:
+    explicit Port(std::string kept = {}) : kept_(std::move(kept)), thread_([this] { serve(); }) {}
+    std::uint16_t number() const { return port_.number(); }
+    void end() {
+      port_.shut();
+      {
+        const std::lock_guard lock(mutex_);
+        if (connection_ >= 0) ::shutdown(connection_, SHUT_RDWR);
+      }
+      thread_.join();
+    }
+    bool send(const std::string& bytes) {
+      const std::lock_guard lock(mutex_);
+      return connection_ >= 0 && ::send(connection_, bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0;
+    }
+    std::vector<std::string> take() {
+      const std::lock_guard lock(mutex_);
+      return std::exchange(commands_, {});
+    }
+
+   private:
+    void serve() {
+      for (;;) {
+        const int connection = port_.accept();
+        if (connection < 0) return;
+        {
+          const std::lock_guard lock(mutex_);
+          connection_ = connection;
+        }
+        std::array<char, 1024> bytes{};
+        std::string text;
+        for (ssize_t n = 0; (n = ::recv(connection, bytes.data(), bytes.size(), 0)) > 0;)
+          obey(text.append(bytes.data(), static_cast<std::size_t>(n)));
+        const std::lock_guard lock(mutex_);
+        ::close(std::exchange(connection_, -1));
+      }
+    }
+    void obey(std::string& text) {
+      for (std::size_t end = 0; (end = text.find(')')) != std::string::npos; text.erase(0, end + 1)) {
+        const std::string command = text.substr(0, end + 1);
+        {
+          const std::lock_guard lock(mutex_);
+          commands_.push_back(command);
+        }
+        const auto mode = std::to_string(static_cast<int>(DobotMode::kEnabled));
+        if (command != kept_) send("0,{" + mode + "}," + command + ";");
+      }
+    }
+
+    const std::string kept_;
+    LoopbackPort port_;
+    std::mutex mutex_;  ///< of what follows
+    int connection_ = -1;
+    std::vector<std::string> commands_;
+    std::thread thread_;  ///< last: it uses all of the above
+  };
+
+  Port dashboard_, motion_{"Sync()"}, feedback_;
+};
+
+}  // namespace hilbrush::test
