@@ -38,10 +38,10 @@ TEST(FilmOfTheWireTest, TheEggCupIsHitWhereItIsInProcess) {
   settings.dpi = 100;
   run_plan({model, settings, find_cell("default"), folder.path()}, {});
   ExposureProgram program = read_program(folder.path() / "program.ply");
-  constexpr std::size_t kDots = 300;
-  ASSERT_GT(program.exposures.size(), kDots);
-  program.exposures.resize(kDots);
-  std::erase_if(program.vias, [](const Via& via) { return via.before_exposure >= kDots; });
+  constexpr std::size_t kPainted = 300;
+  ASSERT_GT(program.exposures.size(), kPainted);
+  program.exposures.resize(kPainted);
+  std::erase_if(program.vias, [](const Via& via) { return via.before_exposure >= kPainted; });
   const CellDescription description = test::shipped_cell();
   const auto in_process = painted_in_process(program, description), on_wire = painted_on_wire(program);
   ASSERT_EQ(on_wire.size(), in_process.size());

@@ -35,7 +35,7 @@ constexpr const char* kReal = R"({
             "axes": {"a": {"unit": 1, "steps_per_deg": 100}, "c": {"unit": 2, "steps_per_deg": 50, "home": "reference_run"}}},
   "laser": {"driver": "obis", "port": "tcp://10.0.0.7:4001", "gate": {"of": "robot", "output": 3}}})";
 
-InputError refusal_of(const Json& json) {
+InputError device_refusal_of(const Json& json) {
   try {
     cell_devices_from_json(json.dump(), "cell.json");
   } catch (const InputError& error) {
@@ -82,7 +82,7 @@ TEST(CellDevices, RefusalsNameTheirPlace) {
   const auto refused_at = [](const std::function<void(Json&)>& change) {
     Json json = cell_with(kReal);
     change(json["devices"]);
-    return refusal_of(json).at();
+    return device_refusal_of(json).at();
   };
   EXPECT_EQ(refused_at([](Json& d) { d["robot"] = "dobot"; }), "cell.json: $.devices.robot");
   EXPECT_EQ(refused_at([](Json& d) { d["robot"] = "robby"; }), "cell.json: $.devices.robot");

@@ -10,7 +10,7 @@
 namespace hilbrush {
 namespace {
 
-std::string error_of(const std::string& text, const std::string& origin = {}) {
+std::string settings_error_of(const std::string& text, const std::string& origin = {}) {
   try {
     job_settings_from_json(text, origin);
   } catch (const InputError& error) {
@@ -152,8 +152,9 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"colour":1})", "$.colour: unknown key"},
       {R"([])", "$: expected an object, found a list of 0"},
   };
-  for (const Case& c : cases) EXPECT_EQ(error_of(c.text), c.error);
-  EXPECT_EQ(error_of(R"({"dpi":9})", "job.json"), "job.json: $.dpi: expected a number from 10 to 1200, found 9");
+  for (const Case& c : cases) EXPECT_EQ(settings_error_of(c.text), c.error);
+  EXPECT_EQ(settings_error_of(R"({"dpi":9})", "job.json"),
+            "job.json: $.dpi: expected a number from 10 to 1200, found 9");
 }
 
 TEST(JobSettings, PreferredIncidenceFollowsALowerMaximum) {

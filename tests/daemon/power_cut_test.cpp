@@ -21,7 +21,7 @@ namespace hilbrush {
 namespace {
 
 constexpr std::size_t kPage = 4096;
-const std::string kProgram(64, 'a');
+const std::string kCutProgram(64, 'a');
 
 struct PowerCut {};
 
@@ -104,7 +104,7 @@ class Part {
   Part(std::size_t count, unsigned seed)
       : count_(count), disk_(std::make_shared<Disk>(Journal::bytes_for(count))), random_(seed), light_(count) {
     const Journal journal =
-        Journal::create(std::make_unique<DiskStorage>(disk_), count, kProgram, "boot 0");  // published: durable
+        Journal::create(std::make_unique<DiskStorage>(disk_), count, kCutProgram, "boot 0");  // published: durable
   }
 
   /// Paints until the power is cut, the process killed or the end; true at the end.
@@ -117,7 +117,7 @@ class Part {
     {
       std::optional<Journal> journal;
       try {
-        journal.emplace(Journal::open(std::make_unique<DiskStorage>(disk_), kProgram, boot));
+        journal.emplace(Journal::open(std::make_unique<DiskStorage>(disk_), kCutProgram, boot));
         is_done = paint(*journal);
       } catch (const PowerCut&) {
       }
@@ -177,7 +177,7 @@ class Part {
     const auto copy = std::make_shared<Disk>(*disk_);
     copy->cut_at = ~std::uint64_t{0};
     const Journal journal =
-        Journal::open(std::make_unique<DiskStorage>(copy), kProgram, "boot " + std::to_string(boots_));
+        Journal::open(std::make_unique<DiskStorage>(copy), kCutProgram, "boot " + std::to_string(boots_));
     for (std::size_t i = 0; i < count_; ++i) {
       const auto state = journal.state(i);
       if (light_[i] > 0 && !ordered_.contains(i)) {
@@ -227,7 +227,7 @@ TEST(PowerCutTest, AtMostOneWindowIsInDoubt) {
     std::mt19937 random(seed);
     constexpr std::size_t kCount = 1100;
     const auto disk = std::make_shared<Disk>(Journal::bytes_for(kCount));
-    std::optional<Journal> journal(Journal::create(std::make_unique<DiskStorage>(disk), kCount, kProgram, "before"));
+    std::optional<Journal> journal(Journal::create(std::make_unique<DiskStorage>(disk), kCount, kCutProgram, "before"));
     disk->operations = 0;
     disk->cut_at = random() % 2200;
     std::size_t exposed = 0;
@@ -247,7 +247,7 @@ TEST(PowerCutTest, AtMostOneWindowIsInDoubt) {
     *disk = at_death;
     disk->cut_power(random);
     disk->cut_at = ~std::uint64_t{0};
-    const Journal after = Journal::open(std::make_unique<DiskStorage>(disk), kProgram, "after");
+    const Journal after = Journal::open(std::make_unique<DiskStorage>(disk), kCutProgram, "after");
     most = std::max(most, after.in_doubt().size());
     ASSERT_LE(after.in_doubt().size(), Journal::kWindow);
     for (std::size_t i = 0; i < exposed; ++i) ASSERT_NE(after.state(i), ExposureState::kRemaining) << i;
@@ -271,7 +271,7 @@ TEST(PowerCutTest, AFullDiskStopsTheJobBeforeTheDotNotInIt) {
     });
     bring_up(sim.cell());
     const auto disk = std::make_shared<Disk>(Journal::bytes_for(600));
-    Journal journal = Journal::create(std::make_unique<DiskStorage>(disk), 600, kProgram, "boot");
+    Journal journal = Journal::create(std::make_unique<DiskStorage>(disk), 600, kCutProgram, "boot");
     disk->operations = 0;
     disk->fails_from = operation;
     ExecutionControl control;
@@ -284,7 +284,7 @@ TEST(PowerCutTest, AFullDiskStopsTheJobBeforeTheDotNotInIt) {
     EXPECT_LE(journal.in_doubt().size(), 1u) << "the dot whose done could not be written";
 
     disk->fails_from = ~std::uint64_t{0};
-    Journal again = Journal::open(std::make_unique<DiskStorage>(disk), kProgram, "boot");
+    Journal again = Journal::open(std::make_unique<DiskStorage>(disk), kCutProgram, "boot");
     const auto rest = execute(program, {}, sim.cell(), description, again, control);
     ASSERT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
     EXPECT_EQ(again.done_count() + again.in_doubt().size(), 600u);

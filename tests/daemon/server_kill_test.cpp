@@ -18,6 +18,7 @@
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/daemon_process.h"
+#include "tests/daemon/witnessed_cell.h"
 
 namespace hilbrush {
 namespace {
@@ -26,19 +27,15 @@ using test::connect;
 using test::DaemonProcess;
 using test::DaemonWorld;
 using test::is_built;
+using test::JointsKey;
 using test::Json;
+using test::key_of;
 using test::LineClient;
-
-std::string key_of(const Joints& joints) {
-  std::string key;
-  for (const double value : joints) key += std::to_string(std::llround(value * 1e10)) + " ";
-  return key;
-}
 
 /// By the witness: no dot twice, and each that is not in doubt once.
 void expect_painted_once(const std::filesystem::path& folder, const Json& job) {
   const auto in_doubt = job.at("in_doubt").get<std::set<std::size_t>>();
-  std::map<std::string, int> counts;
+  std::map<JointsKey, int> counts;
   for (const auto& emission : read_emission_record(folder / "emissions.ply")) {
     EXPECT_FALSE(emission.is_moving);
     ++counts[key_of(emission.joints)];

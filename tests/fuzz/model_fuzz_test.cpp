@@ -11,6 +11,7 @@
 #include "sampling/images/image_file.h"
 #include "sampling/input_error.h"
 #include "sampling/model_file.h"
+#include "tests/fuzz/campaign.h"
 #include "tests/fuzz/mutator.h"
 #include "tests/fuzz/opened_files.h"
 #include "tests/fuzz/playground.h"
@@ -22,6 +23,9 @@ namespace hilbrush {
 namespace {
 
 namespace fs = std::filesystem;
+using test::CrashReports;
+using test::current_seed;
+using test::number_from_environment;
 
 #if defined(__SANITIZE_ADDRESS__)
 constexpr bool kIsSanitized = true;
@@ -30,23 +34,6 @@ constexpr bool kIsSanitized = false;
 #endif
 
 using Clock = std::chrono::steady_clock;
-
-/// What a signal handler may print: which mutant was being read.
-volatile std::uint64_t current_seed = 0;
-
-void report_crash(int signal) {
-  char text[120];
-  const int length = std::snprintf(text, sizeof text, "signal %d while reading the mutant of seed %llu\n", signal,
-                                   static_cast<unsigned long long>(current_seed));
-  if (length > 0 && write(STDERR_FILENO, text, static_cast<std::size_t>(length)) < 0) _exit(3);
-  std::signal(signal, SIG_DFL);
-  raise(signal);
-}
-
-std::uint64_t number_from_environment(const char* name, std::uint64_t otherwise) {
-  const char* text = std::getenv(name);
-  return text ? std::strtoull(text, nullptr, 10) : otherwise;
-}
 
 /// Nothing here waits, so the processor's time is the operator's on an idle machine, and the same on a busy one.
 double cpu_s() {
@@ -67,7 +54,7 @@ bool is_below(const fs::path& file, const fs::path& folder) {
 /// Runs `read` on mutants until the count or, without one asked for, the time of a slice is used up.
 template <class Read>
 void run_campaign(const std::map<std::string, std::string>& seeds, double slice_s, const Read& read) {
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM}) std::signal(signal, report_crash);
+  const CrashReports crash_reports;
   const std::uint64_t wanted = number_from_environment("HILBRUSH_FUZZ_INPUTS", 0);
   const std::uint64_t first_seed = number_from_environment("HILBRUSH_FUZZ_SEED", 1);
   std::vector<std::string> donors;

@@ -11,7 +11,7 @@ namespace hilbrush {
 namespace {
 
 using Eigen::Vector2d;
-constexpr unsigned kSeed = 20260117;
+constexpr unsigned kToneSeed = 20260117;
 
 SurfacePoint at(std::uint32_t t, const Vector2d& b) {
   return {t, {1 - b.x() - b.y(), b.x(), b.y()}};
@@ -52,16 +52,16 @@ void expect_exact(const ToneField& tone, std::mt19937& random, double tolerance)
     const ToneIntegral exact = tone.integrate(t, p), brute = brute_force(tone, t, p, 600);
     EXPECT_NEAR(exact.area_m2 / brute.area_m2, 1, 1e-9);
     EXPECT_NEAR(exact.mass / brute.area_m2, brute.mass / brute.area_m2, tolerance)
-        << "seed " << kSeed << " triangle " << t;
+        << "seed " << kToneSeed << " triangle " << t;
     EXPECT_NEAR((exact.first - brute.first).norm() / brute.area_m2, 0, tolerance)
-        << "seed " << kSeed << " triangle " << t;
+        << "seed " << kToneSeed << " triangle " << t;
     EXPECT_NEAR(exact.square / brute.area_m2, brute.square / brute.area_m2, 2 * tolerance)
-        << "seed " << kSeed << " triangle " << t;
+        << "seed " << kToneSeed << " triangle " << t;
   }
 }
 
 TEST(ToneField, IntegralsOfTexturesAreExactHoweverTheyAreAddressed) {
-  std::mt19937 random(kSeed);
+  std::mt19937 random(kToneSeed);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (const bool repeat_u : {true, false})
     for (const bool repeat_v : {true, false})
@@ -90,7 +90,7 @@ TEST(ToneField, CollapsedTextureCoordinatesStillHaveATone) {
 }
 
 TEST(ToneField, LinearColoursAreExactAcrossTheCurvesKnots) {
-  std::mt19937 random(kSeed);
+  std::mt19937 random(kToneSeed);
   std::uniform_real_distribution<float> uniform(0, 1);
   TexturedMesh mesh = test::rectangle(.05, .03, 4, 2);
   for (auto& corners : mesh.corner_luminance)
@@ -123,11 +123,11 @@ TEST(ToneField, TheCurveBendsBetweenTexelsToo) {
   ToneOptions options;
   options.curve = {{0, .5, 1}, {0, .35, 2}};
   const ToneField tone(mesh, options);
-  std::mt19937 random(kSeed);
+  std::mt19937 random(kToneSeed);
   std::uniform_real_distribution<double> uniform(0, .5);
   for (int k = 0; k < 1000; ++k) {
     const SurfacePoint point = at(static_cast<std::uint32_t>(k % 2), {uniform(random), uniform(random)});
-    EXPECT_NEAR(tone.asked(point), options.curve(tone.wanted(point)), .06) << "seed " << kSeed;
+    EXPECT_NEAR(tone.asked(point), options.curve(tone.wanted(point)), .06) << "seed " << kToneSeed;
   }
 }
 

@@ -35,7 +35,7 @@ struct ReadyCell {
     cell.laser.connect(), cell.laser.enable();
   }
   static CellDescription with_time_scale(double time_scale) {
-    CellDescription description = test::small_cell();
+    CellDescription description = test::handmade_cell();
     description.simulation.time_scale = time_scale;
     return description;
   }
@@ -50,7 +50,7 @@ struct ReadyCell {
 constexpr double kSettle = .12;
 
 TEST(SimCell, StartsDisconnectedWithTheLaserOff) {
-  SimCell sim(test::small_cell());
+  SimCell sim(test::handmade_cell());
   const Cell cell = sim.cell();
   EXPECT_EQ(cell.robot.status().state, DeviceState::kDisconnected);
   EXPECT_EQ(cell.table.status().state, DeviceState::kDisconnected);
@@ -62,7 +62,7 @@ TEST(SimCell, StartsDisconnectedWithTheLaserOff) {
 }
 
 TEST(SimCell, RefusesWhatItsStateDoesNotAllowInASentence) {
-  SimCell sim(test::small_cell());
+  SimCell sim(test::handmade_cell());
   const Cell cell = sim.cell();
   EXPECT_EQ(refusal([&] { cell.robot.move_to({}, 0); }), "the robot cannot be moved: it is disconnected");
   EXPECT_EQ(refusal([&] { cell.robot.enable(); }), "the robot cannot be enabled: it is disconnected");
@@ -208,7 +208,7 @@ TEST(SimCell, TheInterlockCutsThePulseAtOnceAndLatches) {
 }
 
 TEST(SimCell, TheLaserIsNotEnabledWithTheInterlockOpen) {
-  SimCell sim(test::small_cell());
+  SimCell sim(test::handmade_cell());
   Laser& laser = sim.cell().laser;
   laser.connect();
   sim.set_interlock_closed(false);
@@ -221,7 +221,7 @@ TEST(SimCell, EnablingTheLaserPaysItsStartDelayOnTheCellsClock) {
 }
 
 TEST(SimCell, DisablingEndsAStartDelay) {
-  CellDescription description = test::small_cell();
+  CellDescription description = test::handmade_cell();
   description.simulation.time_scale = 1;
   SimCell sim(description, {.laser_start_delay_s = 1000});
   Laser& laser = sim.cell().laser;

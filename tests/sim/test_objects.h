@@ -11,7 +11,7 @@
 /// A small cell and simple objects for the tests of sim/, made by hand so that they test nothing else.
 namespace hilbrush::test {
 
-inline CellDescription small_cell() {
+inline CellDescription handmade_cell() {
   CellDescription cell;
   cell.name = "test";
   const AxisDescription turn{-180 * kDegree, 180 * kDegree, 720 * kDegree, 8000 * kDegree, 10 * kDegree, 0};

@@ -4,10 +4,10 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "sampling/input_error.h"
+#include "tests/support/meshes.h"
 
 namespace hilbrush {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kPi = std::numbers::pi;
+using test::kPi;
 
 std::vector<ParametricShape> all_shapes() {
   std::vector<ParametricShape> shapes;

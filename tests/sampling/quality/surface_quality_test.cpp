@@ -19,7 +19,7 @@ namespace {
 using Eigen::Vector2d, Eigen::Vector3d;
 using Sets = std::vector<std::span<const Dot>>;
 
-constexpr double kPi = std::numbers::pi;
+using test::kPi;
 
 TEST(DiscTriangleArea, HasItsClosedForms) {
   const Vector2d a(-1, -1), b(3, -1), c(-1, 3);

@@ -45,7 +45,7 @@ TEST(Calibrate, PaintThatShowsNothingIsAnError) {
 }
 
 TEST(Calibrate, TheSimulatedWedgeReadsWhatIsWanted) {
-  const CellDescription cell = test::small_cell();
+  const CellDescription cell = test::handmade_cell();
   for (const Sampler sampler : {Sampler::kCentroid, Sampler::kRandom}) {
     PictureOptions options;
     options.sample.sampler = sampler;

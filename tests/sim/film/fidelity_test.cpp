@@ -30,7 +30,7 @@ struct EvenPicture {
     film.expose_at(points, std::vector<float>(points.size(), static_cast<float>(painted / 4)));
   }
   static CellDescription linear_cell() {
-    CellDescription cell = test::small_cell();
+    CellDescription cell = test::handmade_cell();
     cell.paint.response = PaintResponse::kLinear;
     return cell;
   }
@@ -75,7 +75,7 @@ TEST(Fidelity, AConstantErrorHasTheFiguresOfItsClosedForm) {
 }
 
 TEST(Fidelity, ABlankPictureOfBlankSurfaceIsIdentical) {
-  const CellDescription cell = test::small_cell();
+  const CellDescription cell = test::handmade_cell();
   const TexturedMesh mesh = test::square(.02, 0, 1);
   const ToneField tone(mesh, {});
   const Film film(mesh, cell, kPitch);
@@ -87,7 +87,7 @@ TEST(Fidelity, ABlankPictureOfBlankSurfaceIsIdentical) {
 }
 
 TEST(Fidelity, NothingReachableGivesNoFigures) {
-  const CellDescription cell = test::small_cell();
+  const CellDescription cell = test::handmade_cell();
   const TexturedMesh mesh = test::square(.02);
   const ToneField tone(mesh, {});
   const Film film(mesh, cell, kPitch);

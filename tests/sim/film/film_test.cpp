@@ -12,11 +12,11 @@
 namespace hilbrush {
 namespace {
 
-using test::small_cell;
+using test::handmade_cell;
 using test::square;
 using test::visit_surface;
 
-constexpr double kPitch = .254e-3;
+constexpr double kCellPitch = .254e-3;
 
 /// Joints whose beam has its focus at p_O and travels along direction_W's yaw, with the table level: solved here from
 /// the frame comment.
@@ -41,7 +41,7 @@ Emission emission_at(const CellDescription& cell, const Eigen::Vector3d& p_O, do
   Emission emission;
   emission.joints = joints_for(cell, p_O, yaw, tilt, rotation);
   emission.length_s = emission.commanded_s = .005;
-  emission.power_w = full_energy_j(cell, kPitch) / .005;
+  emission.power_w = full_energy_j(cell, kCellPitch) / .005;
   return emission;
 }
 
@@ -53,9 +53,9 @@ double total_energy(const Film& film, double step_m) {
 }
 
 TEST(Film, DoseOnAPlaneSumsToTheEnergyOfTheEmissions) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   const TexturedMesh mesh = square(.02);
-  Film film(mesh, cell, kPitch);
+  Film film(mesh, cell, kCellPitch);
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> place(-.008, .008);
   std::vector<Emission> emissions;
@@ -65,25 +65,25 @@ TEST(Film, DoseOnAPlaneSumsToTheEnergyOfTheEmissions) {
     energy += emissions.back().power_w * emissions.back().length_s;
   }
   film.expose(emissions);
-  EXPECT_NEAR(total_energy(film, kPitch / 4), energy, .01 * energy);
+  EXPECT_NEAR(total_energy(film, kCellPitch / 4), energy, .01 * energy);
 }
 
 TEST(Film, AnObliqueSpotKeepsItsEnergyAndGrowsLonger) {
   const TexturedMesh mesh = square(.01);
-  CellDescription cell = small_cell();
+  CellDescription cell = handmade_cell();
   double width_at_vertical = 0;
   for (const double incidence : {0., 20., 45.}) {
     cell.arm.beam_depression = (90 - incidence) * kDegree;
-    Film film(mesh, cell, kPitch);
+    Film film(mesh, cell, kCellPitch);
     const Emission emission = emission_at(cell, Eigen::Vector3d::Zero(), 0);
     const Hit hit = film.expose(std::span(&emission, 1)).front();
     EXPECT_NEAR(hit.incidence, incidence * kDegree, 1e-6);
     const double energy = emission.power_w * emission.length_s;
-    EXPECT_NEAR(total_energy(film, kPitch / 8), energy, .01 * energy) << incidence;
+    EXPECT_NEAR(total_energy(film, kCellPitch / 8), energy, .01 * energy) << incidence;
 
     // Variances, less what interpolating linearly between nodes h apart adds: h^2 / 6.
-    Eigen::Vector2d spread = Eigen::Vector2d::Constant(-std::pow(kPitch / 2, 2) / 6);
-    visit_surface(mesh, kPitch / 8, [&](const SurfacePoint& point, double area_m2) {
+    Eigen::Vector2d spread = Eigen::Vector2d::Constant(-std::pow(kCellPitch / 2, 2) / 6);
+    visit_surface(mesh, kCellPitch / 8, [&](const SurfacePoint& point, double area_m2) {
       spread += position(mesh, point).head<2>().cwiseAbs2() * film.dose_j_m2(point) * area_m2 / energy;
     });
     if (incidence == 0) width_at_vertical = spread.y();
@@ -94,15 +94,15 @@ TEST(Film, AnObliqueSpotKeepsItsEnergyAndGrowsLonger) {
 
 TEST(Film, TheSpotIsTheGaussianOfTheCell) {
   const CellDescription cell = [] {
-    CellDescription c = small_cell();
+    CellDescription c = handmade_cell();
     c.arm.beam_depression = 90 * kDegree;
     return c;
   }();
   const TexturedMesh mesh = square(.01);
-  Film film(mesh, cell, kPitch);
-  const Emission emission = emission_at(cell, Eigen::Vector3d(kPitch / 3, 0, 0), 0);
+  Film film(mesh, cell, kCellPitch);
+  const Emission emission = emission_at(cell, Eigen::Vector3d(kCellPitch / 3, 0, 0), 0);
   film.expose(std::span(&emission, 1));
-  const double w = spot_diameter_m(cell, kPitch) / 2;
+  const double w = spot_diameter_m(cell, kCellPitch) / 2;
   const double peak = 2 * emission.power_w * emission.length_s / (std::numbers::pi * w * w);
   std::vector<FilmPoint> points;
   film.points_near({0, {.5, 0, .5}}, .003, points);
@@ -111,7 +111,7 @@ TEST(Film, TheSpotIsTheGaussianOfTheCell) {
   int lit = 0;
   for (const FilmPoint& point : points) {
     if (point.area_m2 < .999 * whole_m2) continue;
-    const double r = (point.position_O - Eigen::Vector3d(kPitch / 3, 0, 0)).norm();
+    const double r = (point.position_O - Eigen::Vector3d(kCellPitch / 3, 0, 0)).norm();
     const double expected = r < kSpotCutRadii * w ? peak * std::exp(-2 * r * r / (w * w)) : 0;
     if (std::abs(r - kSpotCutRadii * w) < 1e-6) continue;
     EXPECT_NEAR(point.dose_j_m2, expected, .005 * peak);
@@ -121,9 +121,9 @@ TEST(Film, TheSpotIsTheGaussianOfTheCell) {
 }
 
 TEST(Film, BeamsLandWhereTheClosedFormSays) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   const TexturedMesh mesh = square(.04);
-  Film film(mesh, cell, kPitch);
+  Film film(mesh, cell, kCellPitch);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> place(-.015, .015), yaw(-.4, .4), tilt(-.3, .8), rotation(-3, 3);
   std::vector<Emission> emissions;
@@ -143,10 +143,10 @@ TEST(Film, BeamsLandWhereTheClosedFormSays) {
 }
 
 TEST(Film, BeamsMeetASphereWhereTheRayDoes) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   const double radius = .02;
   const TexturedMesh mesh = test::sphere(radius, 400);
-  Film film(mesh, cell, kPitch);
+  Film film(mesh, cell, kCellPitch);
   const Eigen::Vector3d middle(0, 0, radius);
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> offset(-.008, .008), yaw(-.3, .3), rotation(-3, 3);
@@ -171,7 +171,7 @@ TEST(Film, BeamsMeetASphereWhereTheRayDoes) {
 }
 
 TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimetres) {
-  CellDescription cell = small_cell();
+  CellDescription cell = handmade_cell();
   cell.arm.beam_depression = 90 * kDegree;
   TexturedMesh mesh = square(.01, 0);  // triangles 0 and 1: the lit face
   const double r = .005, below = -.002;
@@ -181,11 +181,11 @@ TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimetres) {
                         {r, -r, below},
                         {r, r, below},
                         {-r, r, below}});  // a sheet behind, facing the light
-  Film film(mesh, cell, kPitch);
+  Film film(mesh, cell, kCellPitch);
   const Emission emission = emission_at(cell, Eigen::Vector3d::Zero(), 0);
   film.expose(std::span(&emission, 1));
   double lit = 0;
-  visit_surface(mesh, kPitch / 4, [&](const SurfacePoint& point, double) {
+  visit_surface(mesh, kCellPitch / 4, [&](const SurfacePoint& point, double) {
     if (point.triangle < 2)
       lit = std::max(lit, film.dose_j_m2(point));
     else
@@ -195,33 +195,33 @@ TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimetres) {
 }
 
 TEST(Film, AnObstacleTakesTheLightAndIsReportedAsShadow) {
-  CellDescription cell = small_cell();
+  CellDescription cell = handmade_cell();
   cell.arm.beam_depression = 90 * kDegree;
   TexturedMesh mesh = square(.01, 0);
   const double r = .002, above = .01;
   test::add_quad(mesh, {Eigen::Vector3d{-r, -r, above}, {r, -r, above}, {r, r, above}, {-r, r, above}});
-  Film film(mesh, cell, kPitch);
+  Film film(mesh, cell, kCellPitch);
   const Emission emission = emission_at(cell, Eigen::Vector3d::Zero(), 0);
   const Hit hit = film.expose(std::span(&emission, 1)).front();
   EXPECT_TRUE(hit.is_shadowed);
   EXPECT_GE(hit.point.triangle, 2u);
   EXPECT_NEAR(hit.defocus_m, -above, 1e-9);
   const double energy = emission.power_w * emission.length_s;
-  EXPECT_NEAR(total_energy(film, kPitch / 8), energy, .01 * energy);
+  EXPECT_NEAR(total_energy(film, kCellPitch / 8), energy, .01 * energy);
 }
 
 TEST(Film, DefocusSpreadsTheSpotAndKeepsItsEnergy) {
-  CellDescription cell = small_cell();
+  CellDescription cell = handmade_cell();
   cell.arm.beam_depression = 90 * kDegree;
   const TexturedMesh mesh = square(.02);
   double sharp_peak = 0;
   for (const double defocus : {0., .03}) {
-    Film film(mesh, cell, kPitch);
+    Film film(mesh, cell, kCellPitch);
     const Emission emission = emission_at(cell, {0, 0, defocus}, 0);
     const Hit hit = film.expose(std::span(&emission, 1)).front();
     EXPECT_NEAR(hit.defocus_m, defocus, 1e-9);
     const double energy = emission.power_w * emission.length_s;
-    EXPECT_NEAR(total_energy(film, kPitch / 8), energy, .01 * energy);
+    EXPECT_NEAR(total_energy(film, kCellPitch / 8), energy, .01 * energy);
     const double peak = film.dose_j_m2({0, {.5, 0, .5}});
     if (defocus == 0)
       sharp_peak = peak;
@@ -231,16 +231,16 @@ TEST(Film, DefocusSpreadsTheSpotAndKeepsItsEnergy) {
 }
 
 TEST(Film, ABeamPastTheObjectLandsNowhere) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   const TexturedMesh mesh = square(.01);
-  Film film(mesh, cell, kPitch);
+  Film film(mesh, cell, kCellPitch);
   const Emission emission = emission_at(cell, {.05, .05, 0}, 0);
   EXPECT_FALSE(film.expose(std::span(&emission, 1)).front().is_hit);
-  EXPECT_EQ(total_energy(film, kPitch), 0);
+  EXPECT_EQ(total_energy(film, kCellPitch), 0);
 }
 
 TEST(Film, NeedlesAndSliversCarryTheSameDoseAsAPlainSquare) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   // The same square as a fan of 400 needles from one corner.
   TexturedMesh needles;
   const double r = .005;
@@ -255,7 +255,7 @@ TEST(Film, NeedlesAndSliversCarryTheSameDoseAsAPlainSquare) {
     }
   }
   const TexturedMesh plain = square(2 * r);
-  Film film(plain, cell, kPitch), needle_film(needles, cell, kPitch);
+  Film film(plain, cell, kCellPitch), needle_film(needles, cell, kCellPitch);
   std::vector<Emission> emissions;
   double energy = 0;
   for (int i = 0; i < 400; ++i) {
@@ -264,32 +264,32 @@ TEST(Film, NeedlesAndSliversCarryTheSameDoseAsAPlainSquare) {
   }
   film.expose(emissions);
   needle_film.expose(emissions);
-  EXPECT_NEAR(total_energy(film, kPitch / 4), energy, .01 * energy);
-  EXPECT_NEAR(total_energy(needle_film, kPitch / 8), energy, .01 * energy);
+  EXPECT_NEAR(total_energy(film, kCellPitch / 4), energy, .01 * energy);
+  EXPECT_NEAR(total_energy(needle_film, kCellPitch / 8), energy, .01 * energy);
 }
 
 TEST(Film, FilmPointsStandForTheAreaOfTheSurface) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   const TexturedMesh mesh = square(.02);
-  const Film film(mesh, cell, kPitch);
+  const Film film(mesh, cell, kCellPitch);
   std::vector<FilmPoint> points;
   film.points_near({0, {.5, 0, .5}}, .05, points);
   double area = 0;
   for (const FilmPoint& point : points) area += point.area_m2;
   EXPECT_NEAR(area, mesh.area_m2(), 1e-6 * area);
-  const double radius = 12 * kPitch;
+  const double radius = 12 * kCellPitch;
   film.points_near({0, {.5, 0, .5}}, radius, points);
   area = 0;
   for (const FilmPoint& point : points) {
     area += point.area_m2;
-    EXPECT_LE((point.position_O - Eigen::Vector3d::Zero()).norm(), radius + kPitch / 2);
+    EXPECT_LE((point.position_O - Eigen::Vector3d::Zero()).norm(), radius + kCellPitch / 2);
     EXPECT_LT((point.position_O - position(mesh, point.point)).norm(), 1e-12);
   }
   EXPECT_NEAR(area, std::numbers::pi * radius * radius, .02 * area);
 }
 
 TEST(Film, TheSameBytesForAnyNumberOfThreads) {
-  const CellDescription cell = small_cell();
+  const CellDescription cell = handmade_cell();
   const TexturedMesh mesh = test::sphere(.015, 30);
   std::vector<Emission> emissions;
   std::mt19937_64 random(11);
@@ -300,10 +300,10 @@ TEST(Film, TheSameBytesForAnyNumberOfThreads) {
   std::vector<double> first;
   for (const int threads : {1, 2, 3, 8}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    Film film(mesh, cell, kPitch);
+    Film film(mesh, cell, kCellPitch);
     film.expose(emissions);
     std::vector<double> doses;
-    visit_surface(mesh, kPitch, [&](const SurfacePoint& point, double) { doses.push_back(film.dose_j_m2(point)); });
+    visit_surface(mesh, kCellPitch, [&](const SurfacePoint& point, double) { doses.push_back(film.dose_j_m2(point)); });
     if (first.empty()) first = doses;
     EXPECT_EQ(first, doses) << threads << " threads";
   }

@@ -13,12 +13,12 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kPitch = .254e-3;
+constexpr double kLoopPitch = .254e-3;
 
 /// Bars of black on white, some thinner than a pitch, and a transparent part: a tone curve made on flat grey gets their
 /// coverage wrong.
 TexturedMesh bars() {
-  TexturedMesh mesh = test::square(60 * kPitch);
+  TexturedMesh mesh = test::square(60 * kLoopPitch);
   mesh.corner_uv = {{Eigen::Vector2d(0, 0), {1, 0}, {1, 1}}, {Eigen::Vector2d(0, 0), {1, 1}, {0, 1}}};
   Texture texture{.width = 256, .height = 256, .luminance = {}, .opacity = {}, .name = "bars"};
   for (int y = 0; y < 256; ++y)
@@ -33,7 +33,7 @@ TexturedMesh bars() {
 
 class PredictiveLoop : public testing::Test {
  protected:
-  PredictiveLoop() : cell_(test::small_cell()), mesh_(bars()), curve_(mesh_) {
+  PredictiveLoop() : cell_(test::handmade_cell()), mesh_(bars()), curve_(mesh_) {
     options_.curve = {{0, .1, .2, .3, .4, .5, .6, .7, .8, .9, 1},  // of such a cell, from its wedge
                       {0, .068, .134, .202, .273, .35, .434, .542, .684, .914, 1.5}};
     tone_.emplace(mesh_, options_);
@@ -45,7 +45,7 @@ class PredictiveLoop : public testing::Test {
     if (count)
       sample.dot_count = count;
     else
-      sample.pitch_m = kPitch;
+      sample.pitch_m = kLoopPitch;
     return place_predictively(
         *tone_, *tone_, options_.curve, {.rounds = rounds, .levels = {1}},
         [&](const ToneField& density) { return place_dots(curve_, density, sample); }, film_predictor(cell_, *tone_),

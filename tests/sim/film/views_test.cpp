@@ -89,7 +89,7 @@ class Pictures : public ::testing::Test {
 
 TEST_F(Pictures, ShowWantedPaintedAndErrorWhereTheyAre) {
   // A wall facing the front, its upper left quarter black.
-  const CellDescription cell = test::small_cell();
+  const CellDescription cell = test::handmade_cell();
   TexturedMesh mesh;
   const double r = .02;
   for (int i = 0; i < 2; ++i)
