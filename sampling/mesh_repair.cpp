@@ -8,6 +8,7 @@
 
 #include "sampling/disk/edges.h"
 #include "sampling/input_error.h"
+#include "sampling/renumber.h"
 
 namespace hilbrush {
 namespace {
@@ -382,6 +383,7 @@ RepairedMesh repair_mesh(TexturedMesh mesh) {
   for (std::size_t added = split; added > 0; split += added)
     added = split_vertices(mesh, find_neighbours(mesh.triangles));
   count("vertices split where parts only touch", split);
+  renumber_along_surface(mesh);
   result.mesh = std::move(mesh);
   return result;
 }

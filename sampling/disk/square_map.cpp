@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 /// Strips are mapped onto at most so many squares in a row.
 constexpr double kMostSquares = 64;
 /// A map that lengthens the curve by more is made again with a sliding boundary.
-constexpr double kGoodLengthening = 1.006;
+constexpr double kGoodLengthening = 1.007;
 /// So many parts that the map shrinks to nothing are slit open, one after the other.
 constexpr int kMostExtensions = 6;
 /// Each of them must leave at most this share of the flipped faces.

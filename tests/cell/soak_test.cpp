@@ -111,7 +111,8 @@ class WireSoak {
     EXPECT_EQ(job.at("dots").at("exposed").get<std::size_t>() + in_doubt.size(), program.exposures.size());
     for (std::size_t i = 0; i < program.exposures.size(); ++i) {
       ASSERT_LE(testimony.light[i], 1) << "dot " << i;
-      ASSERT_TRUE(testimony.is_whole[i] || in_doubt.contains(i)) << "dot " << i;
+      ASSERT_TRUE(testimony.is_whole[i] || in_doubt.contains(i))
+          << "dot " << i << ", lit " << testimony.light[i] << " times";
     }
     dots += program.exposures.size();
     doubts += in_doubt.size();

@@ -79,7 +79,8 @@ Testimony hear_witness(const ExposureProgram& program, std::vector<Emission> emi
     const Exposure& exposure = program.exposures[*place];
     const double energy_j = emission.length_s * emission.power_w;
     const double wanted_j = static_cast<double>(exposure.power_w) * static_cast<double>(exposure.pulse_s);
-    testimony.is_whole[*place] = ++testimony.light[*place] == 1 && std::abs(energy_j - wanted_j) <= 1e-3 * wanted_j;
+    testimony.is_whole[*place] =
+        ++testimony.light[*place] == 1 && std::abs(energy_j - wanted_j) <= options.energy_tolerance * wanted_j;
   }
   return testimony;
 }

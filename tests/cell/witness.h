@@ -11,8 +11,9 @@
 namespace hilbrush::test {
 
 struct WitnessOptions {
-  double joint_tolerance = 2e-5;     ///< rad or m: what quantised axes may be off
-  double length_tolerance_s = 1e-9;  ///< of a whole pulse
+  double joint_tolerance = 2e-5;  ///< rad or m: what quantised axes may be off
+  /// Of a whole pulse: what a laser may be off before its driver objects, and rounding.
+  double energy_tolerance = 6e-3;
   /// The longest light allowed beyond the wanted pulse: by default the resolution of a gate that counts milliseconds
   /// (its power makes up for it).
   double overrun_s = 1e-3;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sampling/disk/edges.h"
+#include "sampling/renumber.h"
 #include "sampling/textured_mesh.h"
 
 /// Larger meshes from small ones, for benchmarks and tests of size.
@@ -25,7 +26,8 @@ inline void halve_side(TexturedMesh& mesh, TriangleSide at, std::uint32_t middle
 }
 
 /// Halves the longest edges, round by round, until there are `triangle_count` triangles (or one more); the surface and
-/// its colours stay as they are. Edges are those between vertex indices: weld the mesh before.
+/// its colours stay as they are. Edges are those between vertex indices: weld the mesh before. Numbered as a mesh of
+/// that size from a file would be.
 inline TexturedMesh subdivided(TexturedMesh mesh, std::size_t triangle_count) {
   while (mesh.triangles.size() < triangle_count) {
     const EdgeTable edges = edge_table(mesh.triangles);
@@ -51,6 +53,7 @@ inline TexturedMesh subdivided(TexturedMesh mesh, std::size_t triangle_count) {
       }
     }
   }
+  renumber_along_surface(mesh);
   return mesh;
 }
 
