@@ -32,9 +32,16 @@ constexpr const char* kPosix =
 const LibraryRule kRules[]{
     {"sampling_images", "sampling/images/.*", "sampling/[^/]+\\.h|sampling/images/.*",
      "OpenImageIO/.*|Eigen/.*|zlib\\.h"},
+    // What meets bytes from outside knows nothing of what is done with a mesh.
+    {"models",
+     "sampling/((files|vrml)/.*|(model_file|model_folder|textured_mesh|mesh_repair|renumber|placement)\\.(h|cpp)|disk/"
+     "edges\\.(h|cpp))",
+     "sampling/((files|vrml)/.*|(model_file|model_folder|textured_mesh|mesh_repair|renumber|placement|input_error|"
+     "check)\\.h|disk/edges\\.h)",
+     "Eigen/.*|OpenMesh/.*|zlib\\.h"},
     {"sampling", "sampling/.*",
      "sampling/([^/]+|(files|vrml|tone|disk|curve|parametric|laminar|gaps|relax|quality)/.*)\\.h",
-     "(unsupported/)?Eigen/.*|OpenMesh/.*|tbb/.*|oneapi/.*|zlib\\.h|boost/polygon/.*|metis\\.h"},
+     "(unsupported/)?Eigen/.*|tbb/.*|oneapi/.*|boost/polygon/.*|metis\\.h"},
     {"cell_model", "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.(h|cpp)",
      "planner/(cell_description|exposure_program|program_file|sha256|time_model)\\.h", "Eigen/.*"},
     {"planner", "planner/.*", "planner/.*|sampling/[^/]+\\.h", "Eigen/.*|embree3/.*|tbb/.*|oneapi/.*"},
@@ -155,6 +162,7 @@ TEST(Includes, TheTableRefusesWhatItShould) {
     return !is_allowed(*rule_of(path), header, is_ours);
   };
   EXPECT_TRUE(refused("sampling/dots.cpp", "planner/plan.h", true));
+  EXPECT_TRUE(refused("sampling/vrml/parser.cpp", "sampling/sample.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "sampling/images/image_file.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "OpenImageIO/imageio.h", false));
   EXPECT_TRUE(refused("planner/sha256.cpp", "sampling/dots.h", true));
