@@ -41,7 +41,7 @@ class WireSoak {
     story_.clear();
     set_going(client, id);
     for (;;) {
-      const std::string now = state(client, id);
+      const std::string now = test::job_state(client, id);
       if (now == "done") break;
       if (now == "failed") throw std::runtime_error(client.result("job.get", {{"id", id}}).dump());
       if (now == "paused") set_going(client, id);
@@ -55,29 +55,14 @@ class WireSoak {
   std::size_t disturbances = 0, lost_connections = 0, restarts = 0, dots = 0, doubts = 0;
 
  private:
-  std::string state(LineClient& client, const std::string& id) {
-    return client.result("job.get", {{"id", id}}).at("job").at("state").get<std::string>();
-  }
-
   void restart() {
     daemons_.end();
     daemons_.begin();
     ++restarts;
   }
 
-  /// Armed and painting, from whatever state the cell is in; what went wrong has been mended.
   void set_going(LineClient& client, const std::string& id) {
-    wires_.wire().clear_faults();
-    for (int attempt = 0; attempt < 400; ++attempt) {
-      const auto cell = client.result("cell.status").at("cell").at("state").get<std::string>();
-      if (cell == "stopped") client.call("cell.clear");
-      if (cell == "idle") client.call("cell.arm");
-      const auto job = state(client, id);
-      if (job != "ready" && job != "paused") return;
-      client.call(job == "ready" ? "job.start" : "job.resume", {{"id", id}, {"part_in_place", true}});
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
-    throw std::runtime_error("job " + id + " can't be got going: " + client.call("cell.status").dump());
+    test::set_going(client, id, [this] { wires_.wire().clear_faults(); });
   }
 
   void disturb(LineClient& client, const std::string& id) {

@@ -16,6 +16,7 @@
 #include <iterator>
 #include <ostream>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -109,6 +110,25 @@ class Crowd {
   std::atomic<std::size_t> visits_{0};
   std::thread thread_;
 };
+
+inline std::string job_state(LineClient& client, const std::string& id) {
+  return client.result("job.get", {{"id", id}}).at("job").at("state").get<std::string>();
+}
+
+/// Armed and painting, from whatever state the cell is in; `mend` undoes what went wrong.
+inline void set_going(LineClient& client, const std::string& id, const std::function<void()>& mend) {
+  for (int attempt = 0; attempt < 400; ++attempt) {
+    mend();
+    const auto cell = client.result("cell.status").at("cell").at("state").get<std::string>();
+    if (cell == "stopped") client.call("cell.clear");
+    if (cell == "idle") client.call("cell.arm");
+    const std::string job = job_state(client, id);
+    if (job != "ready" && job != "paused") return;
+    client.call(job == "ready" ? "job.start" : "job.resume", {{"id", id}, {"part_in_place", true}});
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  throw std::runtime_error("job " + id + " can't be got going: " + client.call("cell.status").dump());
+}
 
 /// From the end of the first quarter to the end of it all.
 struct SoakTrace {

@@ -54,21 +54,8 @@ class Soak {
   std::size_t jobs = 0, disturbances = 0, doubts = 0;
 
  private:
-  /// Armed and painting, from whatever state the cell is in.
   void set_going(LineClient& client, const std::string& id) {
-    for (int attempt = 0; attempt < 200; ++attempt) {
-      devices_->sim.set_interlock_closed(true);
-      const auto cell = client.result("cell.status").at("cell").at("state").get<std::string>();
-      if (cell == "stopped") client.call("cell.clear");
-      if (cell == "idle") client.call("cell.arm");
-      const auto job = state(client, id);
-      if (job != "ready" && job != "paused") return;
-      client.call(job == "ready" ? "job.start" : "job.resume", {{"id", id}, {"part_in_place", true}});
-    }
-    throw std::runtime_error("job " + id + " can't be got going");
-  }
-  std::string state(LineClient& client, const std::string& id) {
-    return client.result("job.get", {{"id", id}}).at("job").at("state").get<std::string>();
+    test::set_going(client, id, [this] { devices_->sim.set_interlock_closed(true); });
   }
 
   void disturb(LineClient& client, const std::string& id) {
