@@ -29,6 +29,9 @@ constexpr double kNearest = .58;
 /// on the border, where no neighbour is on the other side to be pushed back by.
 constexpr double kFarthest = .78;
 constexpr int kEveningRounds = 3;
+/// Who leaves one neighbour may come too near to another, and the last word is theirs.
+constexpr int kLastPushes = 3;
+constexpr int kSweeps = kChoiceSweeps + kNewtonSweeps + 2 * kEveningRounds + kLastPushes;
 /// Border within so many spacings of a place is looked at.
 constexpr double kToBorder = .4;
 /// How far Newton steps may take a dot from the place that was chosen, and a single one, in spacings.
@@ -107,6 +110,8 @@ class Relaxation {
       visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round, [&](std::size_t i) { close_hole(i); });
       visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round + 1, [&](std::size_t i) { leave_nearest(i); });
     }
+    for (int sweep = kSweeps - kLastPushes; sweep < kSweeps; ++sweep)
+      visit_all(progress, sweep, [&](std::size_t i) { leave_nearest(i); });
   }
 
   const std::vector<SurfacePlace>& dots() const { return dots_; }
@@ -256,7 +261,7 @@ class Relaxation {
         const std::size_t begin = stretches[s] * Colouring::kStretch;
         for (std::size_t i = begin; i < std::min(begin + Colouring::kStretch, dots_.size()); ++i) visit(i);
       });
-    if (progress) progress(.5 + .5 * (sweep + 1) / (kChoiceSweeps + kNewtonSweeps + 2 * kEveningRounds));
+    if (progress) progress(.5 + .5 * (sweep + 1) / kSweeps);
   }
 
   const SurfaceCurve& curve_;
