@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <map>
 
 #include "daemon/executor.h"
@@ -84,7 +84,7 @@ void expect_painted(const RandomWork& work, const Plan& plan, double pitch_m, Ca
 void run(std::uint64_t seed, Campaign& campaign) {
   RandomWork work = random_work(seed);
   SCOPED_TRACE("seed " + std::to_string(seed) + ", " + work.shape);
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();  // of the processor: a busy machine is nobody's fault
   ++campaign.works;
   const auto dots = sample(work);
   if (!dots || dots->dots.empty()) {
@@ -102,7 +102,7 @@ void run(std::uint64_t seed, Campaign& campaign) {
     expect_painted(work, plan, dots->pitch_m, campaign);
   campaign.dots += dots->dots.size();
   campaign.exposed += plan.program.exposures.size();
-  const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double spent_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   if (spent_s > campaign.slowest_s) campaign.slowest_s = spent_s, campaign.slowest_seed = seed;
 }
 
@@ -121,7 +121,7 @@ TEST(RandomCells, EveryProgramPassesItsCheckAndEveryExposureLands) {
   }
   std::printf(
       "%zu cells and objects (%zu without a surface, %zu without a program), %zu of %zu dots exposed, worst hit %.3f "
-      "um, %zu control ticks looked at, estimated time off by at most %.2f %%, slowest %.2f s (seed %llu)\n",
+      "um, %zu control ticks looked at, estimated time off by at most %.2f %%, slowest %.2f CPU s (seed %llu)\n",
       campaign.works, campaign.without_surface, campaign.without_program, campaign.exposed, campaign.dots,
       campaign.worst_hit_um, campaign.ticks, 100 * campaign.worst_eta, campaign.slowest_s,
       static_cast<unsigned long long>(campaign.slowest_seed));
