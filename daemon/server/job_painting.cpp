@@ -236,14 +236,17 @@ bool JobBook::leave_approach(ExecutionOutcome outcome, const std::string& reason
 
 /// What the journals say, one job at a time: the executor's thread has a short queue.
 void JobBook::inspect_next() {
+  // Jobs that end in the meantime may have pushed one out of the history.
+  while (!to_inspect_.empty() && !jobs_.contains(to_inspect_.back())) to_inspect_.pop_back();
   if (to_inspect_.empty() || is_ending_) return;
   const std::int64_t id = to_inspect_.back();
   to_inspect_.pop_back();
   thread_.inspect(paint_order(jobs_.at(id)), [this, id](std::optional<PaintTally> tally) {
-    Job& job = jobs_.at(id);
-    if (tally && (job.state == JobState::kPaused || job.state == JobState::kDone)) {
-      take_tally(job, *tally);
-      changed(job);
+    const auto found = jobs_.find(id);
+    const bool is_kept = found != jobs_.end();
+    if (tally && is_kept && (found->second.state == JobState::kPaused || found->second.state == JobState::kDone)) {
+      take_tally(found->second, *tally);
+      changed(found->second);
     }
     desk_.note_executor_at_rest();
     inspect_next();

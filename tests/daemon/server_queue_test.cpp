@@ -7,6 +7,7 @@
 #include <map>
 
 #include "config/rpc_errors.h"
+#include "daemon/server/job_book.h"
 #include "daemon/server/job_store.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
@@ -308,6 +309,34 @@ TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
   ASSERT_TRUE(store.find(1)) << "the rest is still there";
   EXPECT_EQ(store.find(1)->own_time.p99_s, .002);
   EXPECT_EQ(store.find(1)->measured, R"({"move_delay_ms":1.5})");
+}
+
+/// After a start the journals of all jobs are read, the newest first; meanwhile a job may end and push the oldest out.
+TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobody) {
+  DaemonWorld world;
+  {
+    std::filesystem::create_directories(world.options.state);
+    JobStore store(world.options.state / "jobs.sqlite", nullptr);
+    for (std::size_t i = 0; i < JobBook::kHistoryMax; ++i) {
+      Job job;
+      job.state = JobState::kDone;
+      job.is_begun = true;
+      job.placed = 10;
+      job.created = job.ended = "2026-01-01T00:00:00Z";
+      store.insert(job);
+      // A journal as large as may be keeps its reader busy.
+      std::filesystem::create_directories(world.job_folder(std::to_string(job.id)));
+      std::ofstream(world.job_folder(std::to_string(job.id)) / "journal") << std::string(100'000, 'x');
+    }
+  }
+  world.begin();
+  LineClient client(world.options.socket);
+  for (int i = 0; i < 3; ++i) {
+    const std::string id = world.submit(client, world.model("cup.wrl", 5), "done", true);
+    EXPECT_EQ(client.result("job.get", {{"id", id}}).at("job").at("state"), "done");
+  }
+  EXPECT_EQ(client.result("job.list", {{"limit", 1000}}).at("jobs").size(), 1000u);
+  EXPECT_EQ(client.result("job.get", {{"id", "1"}}).at("job").at("state"), "done") << "older ones are looked up";
 }
 
 TEST(JobRecordTest, SaysAllOfAJobAndReadsWhateverItIsGiven) {
