@@ -3,10 +3,6 @@
 #include <malloc.h>
 #include <unistd.h>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#include <sanitizer/allocator_interface.h>
-#endif
-
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
@@ -21,6 +17,11 @@
 #include <thread>
 
 #include "tests/daemon/daemon_fixture.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+// Of the sanitizers' allocator; the compiler brings the function, but no header that declares it.
+extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
+#endif
 
 /// What soaks share: clients that mean no good, and what is left in this process after hours of work.
 namespace hilbrush::test {
