@@ -33,13 +33,9 @@ inline std::string dobot_packet(const DobotFrame& frame) {
 /// A Dobot controller that does nothing by itself: it takes all it is told, and shows the frames it is given.
 class DobotPeer {
  public:
-  ~DobotPeer() {
-    for (Port* port : {&dashboard_, &motion_, &feedback_}) port->end();
-  }
-
-  std::uint16_t dashboard_port() const { return dashboard_.number(); }
-  std::uint16_t motion_port() const { return motion_.number(); }
-  std::uint16_t feedback_port() const { return feedback_.number(); }
+  std::uint16_t dashboard_port() const { return dashboard_.port(); }
+  std::uint16_t motion_port() const { return motion_.port(); }
+  std::uint16_t feedback_port() const { return feedback_.port(); }
 
   /// To whoever listens to the feedback; waits until somebody does.
   void show(const DobotFrame& frame) {
@@ -51,44 +47,23 @@ class DobotPeer {
   std::vector<std::string> take_orders() { return dashboard_.take(); }
 
  private:
-  /// Serves one connection after another, and answers each command but those that are `kept`.
+  /// Answers each command but those that are `kept`.
   class Port {
    public:
-    explicit Port(std::string kept = {}) : kept_(std::move(kept)), thread_([this] { serve(); }) {}
-    std::uint16_t number() const { return port_.number(); }
-    void end() {
-      port_.shut();
-      {
-        const std::lock_guard lock(mutex_);
-        if (connection_ >= 0) ::shutdown(connection_, SHUT_RDWR);
-      }
-      thread_.join();
-    }
-    bool send(const std::string& bytes) {
-      const std::lock_guard lock(mutex_);
-      return connection_ >= 0 && ::send(connection_, bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0;
-    }
+    explicit Port(std::string kept = {}) : kept_(std::move(kept)) {}
+    std::uint16_t port() const { return server_.port(); }
+    bool send(const std::string& bytes) { return server_.send(bytes); }
     std::vector<std::string> take() {
       const std::lock_guard lock(mutex_);
       return std::exchange(commands_, {});
     }
 
    private:
-    void serve() {
-      for (;;) {
-        const int connection = port_.accept();
-        if (connection < 0) return;
-        {
-          const std::lock_guard lock(mutex_);
-          connection_ = connection;
-        }
-        std::array<char, 1024> bytes{};
-        std::string text;
-        for (ssize_t n = 0; (n = ::recv(connection, bytes.data(), bytes.size(), 0)) > 0;)
-          obey(text.append(bytes.data(), static_cast<std::size_t>(n)));
-        const std::lock_guard lock(mutex_);
-        ::close(std::exchange(connection_, -1));
-      }
+    void serve(int connection) {
+      std::array<char, 1024> bytes{};
+      std::string text;
+      for (ssize_t n = 0; (n = ::recv(connection, bytes.data(), bytes.size(), 0)) > 0;)
+        obey(text.append(bytes.data(), static_cast<std::size_t>(n)));
     }
     void obey(std::string& text) {
       for (std::size_t end = 0; (end = text.find(')')) != std::string::npos; text.erase(0, end + 1)) {
@@ -103,11 +78,10 @@ class DobotPeer {
     }
 
     const std::string kept_;
-    LoopbackPort port_;
-    std::mutex mutex_;  ///< of what follows
-    int connection_ = -1;
-    std::vector<std::string> commands_;
-    std::thread thread_;  ///< last: it uses all of the above
+    std::mutex mutex_;
+    std::vector<std::string> commands_;  ///< under the mutex
+    /// Last: its thread uses all of the above.
+    LoopbackServer server_{[this](int connection) { serve(connection); }};
   };
 
   Port dashboard_, motion_{"Sync()"}, feedback_;

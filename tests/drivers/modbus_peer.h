@@ -6,7 +6,6 @@
 #include <map>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -20,19 +19,9 @@ class ModbusPeer {
  public:
   using Registers = std::map<int, std::uint16_t>;
 
-  explicit ModbusPeer(std::function<void(Registers&)> obey) : obey_(std::move(obey)) {
-    thread_ = std::thread([this] { serve(); });
-  }
-  ~ModbusPeer() {
-    port_.shut();
-    {
-      const std::lock_guard lock(mutex_);
-      if (connection_ >= 0) ::shutdown(connection_, SHUT_RDWR);
-    }
-    thread_.join();
-  }
+  explicit ModbusPeer(std::function<void(Registers&)> obey) : obey_(std::move(obey)) {}
 
-  std::uint16_t port() const { return port_.number(); }
+  std::uint16_t port() const { return server_.port(); }
   void set(int unit, int address, std::uint16_t word) {
     const std::lock_guard lock(mutex_);
     units_[unit][address] = word;
@@ -54,21 +43,6 @@ class ModbusPeer {
   }
 
  private:
-  void serve() {
-    for (;;) {
-      const int connection = port_.accept();
-      if (connection < 0) return;
-      {
-        const std::lock_guard lock(mutex_);
-        connection_ = connection;
-      }
-      while (answer(connection)) {
-      }
-      const std::lock_guard lock(mutex_);
-      ::close(std::exchange(connection_, -1));
-    }
-  }
-
   bool answer(int connection) {
     std::array<std::uint8_t, 260> frame{};
     constexpr std::size_t kHead = 6;
@@ -123,13 +97,16 @@ class ModbusPeer {
   }
 
   const std::function<void(Registers&)> obey_;
-  LoopbackPort port_;
   std::mutex mutex_;  ///< of what follows
-  int connection_ = -1, silent_writes_ = 0;
+  int silent_writes_ = 0;
   std::size_t reads_since_write_ = 0;
   std::map<int, Registers> units_;
   std::vector<std::string> writes_;
-  std::thread thread_;
+  /// Last: its thread uses all of the above.
+  LoopbackServer server_{[this](int connection) {
+    while (answer(connection)) {
+    }
+  }};
 };
 
 }  // namespace hilbrush::test
