@@ -95,8 +95,10 @@ class DotWriter {
       : plan_(plan), triangles_(triangles), dots_(dots) {}
 
  protected:
-  void put_at(const SurfacePoint& point, std::uint32_t sheet) {
-    dots_.push_back(triangles_[point.triangle].dot_at(point.barycentric, plan_.mass.curve.sheets[sheet].component));
+  /// `asked`: the tone there, if it is known.
+  void put_at(const SurfacePoint& point, std::uint32_t sheet, std::optional<double> asked = {}) {
+    const std::uint32_t component = plan_.mass.curve.sheets[sheet].component;
+    dots_.push_back(triangles_[point.triangle].dot_at(point.barycentric, component, asked));
   }
 
   const DotPlan& plan_;
@@ -174,8 +176,8 @@ class CentreWriter : public DotWriter {
         const Lifted lifted = lift(walk, mean_place(node, from, to), likely_frame_);
         const SurfacePoint middle = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
         last_quad_ = walk.quad();
-        if (is_surely_painted(triangles_[middle.triangle].asked(middle.barycentric)))
-          return put_at(middle, walk.sheet());
+        const double asked = triangles_[middle.triangle].asked(middle.barycentric);
+        if (is_surely_painted(asked)) return put_at(middle, walk.sheet(), asked);
       }
     add(walk, node, kind, from, to);
     close(index);
@@ -185,7 +187,8 @@ class CentreWriter : public DotWriter {
     // Rounding may leave nothing to a stratum at the very end of the curve.
     if (stratum_.is_empty()) add_quads(last_quad_, last_quad_ + 1);
     const StratumPart& part = stratum_.heaviest();
-    put_at(centre_on_surface(plan_.mass, triangles_, part), part.sheet);
+    const PaintedPoint centre = centre_on_surface(plan_.mass, triangles_, part);
+    put_at(centre.point, part.sheet, centre.asked);
     stratum_.clear();
   }
 

@@ -8,13 +8,14 @@ DotTriangle::DotTriangle(const SurfaceCurve::Implementation& curve, const ToneFi
       surface_(curve.dot_surfaces[triangle]),
       tone_(tone.on(triangle)) {}
 
-Dot DotTriangle::dot_at(const Eigen::Vector3d& place, std::uint32_t component) const {
+Dot DotTriangle::dot_at(const Eigen::Vector3d& place, std::uint32_t component, std::optional<double> asked) const {
   // A beam that is aimed at the very edge of an open surface may pass it by.
   const Eigen::Vector3d least = surface_.least_barycentric.cast<double>();
   Eigen::Vector3d b = place;
   if (b[0] < least[0] || b[1] < least[1] || b[2] < least[2]) {
     b = b.cwiseMax(least);
     b /= b.sum();
+    asked.reset();
   }
   Dot dot;
   dot.position_O = b[0] * corners_O_[0] + b[1] * corners_O_[1] + b[2] * corners_O_[2];
@@ -26,7 +27,7 @@ Dot DotTriangle::dot_at(const Eigen::Vector3d& place, std::uint32_t component) c
   dot.smooth_normal_O = norm > 1e-3f ? Eigen::Vector3f(smooth / norm) : dot.normal_O;
   dot.triangle = triangle_;
   dot.component = component;
-  dot.tone = static_cast<float>(tone_.wanted({b[1], b[2]}));
+  dot.tone = static_cast<float>(asked && tone_.is_wanted_asked() ? *asked : tone_.wanted({b[1], b[2]}));
   return dot;
 }
 

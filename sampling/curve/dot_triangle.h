@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "sampling/curve/surface_curve.h"
 
@@ -16,8 +17,9 @@ class DotTriangle {
   std::uint32_t triangle() const { return triangle_; }
   /// The asked tone.
   double asked(const Eigen::Vector3d& barycentric) const { return tone_.asked({barycentric[1], barycentric[2]}); }
-  /// The dot there, moved a hair inside the triangle.
-  Dot dot_at(const Eigen::Vector3d& barycentric, std::uint32_t component) const;
+  /// The dot there, moved a hair inside the triangle. `asked` is the tone at `barycentric`, which is most often the
+  /// dot's own, if it is known.
+  Dot dot_at(const Eigen::Vector3d& barycentric, std::uint32_t component, std::optional<double> asked = {}) const;
 
  private:
   std::uint32_t triangle_ = kNoTriangle;

@@ -19,12 +19,19 @@ SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t 
                              const Eigen::Vector3d& target_O) {
   const QuadMass& quad = mass.quads[quad_index];
   const BaseQuad& base = mass.base_quad(quad);
+  const Sheet& sheet = mass.sheet_of(quad);
+  const TexturedMesh& mesh = mass.curve.mesh;
+  // With few dots on a large mesh nothing of it is in the cache: all is sent for before any of it is waited for.
+  for (std::uint32_t i = 0; i < base.face_count; ++i)
+    __builtin_prefetch(&mesh.triangles[sheet.face_of(base, i).triangle]);
+  for (std::uint32_t i = 0; i < base.face_count; ++i)
+    for (const std::uint32_t vertex : mesh.triangles[sheet.face_of(base, i).triangle])
+      __builtin_prefetch(&mesh.vertices[vertex]);
   const PieceMass* pieces = mass.pieces_of(quad);
   NearestPoint nearest{{}, std::numeric_limits<double>::infinity()};
   for (std::uint32_t i = 0; i < base.face_count; ++i) {
     if (!(pieces[i].mass > 0)) continue;
-    const NearestPoint there =
-        nearest_in_triangle(mass.curve.mesh, mass.sheet_of(quad).face_of(base, i).triangle, target_O);
+    const NearestPoint there = nearest_in_triangle(mesh, sheet.face_of(base, i).triangle, target_O);
     if (there.distance2 < nearest.distance2) nearest = there;
   }
   return nearest.point;
@@ -83,7 +90,7 @@ bool is_surely_painted(double asked) {
   return asked >= kSurelyPainted;
 }
 
-SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles,
+PaintedPoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles,
                                const StratumPart& part) {
   SurfacePoint point;
   if (part.triangle != kNoTriangle) {
@@ -96,11 +103,13 @@ SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangl
                                    : nearest_in_quad(mass, nearest_quad(mass, part, target), target);
     point = walk_towards(mass.curve.mesh, mass.curve.neighbours, start, target);
   }
-  const double asked = triangles[point.triangle].asked(point.barycentric);
-  if (is_surely_painted(asked)) return point;
-  const SurfacePoint heaviest = heaviest_point(mass, part);
-  return asked > 0 && asked >= kBlankShare * triangles[heaviest.triangle].asked(heaviest.barycentric) ? point
-                                                                                                      : heaviest;
+  const auto painted = [&](const SurfacePoint& place) {
+    return PaintedPoint{place, triangles[place.triangle].asked(place.barycentric)};
+  };
+  const PaintedPoint centre = painted(point);
+  if (is_surely_painted(centre.asked)) return centre;
+  const PaintedPoint heaviest = painted(heaviest_point(mass, part));
+  return centre.asked > 0 && centre.asked >= kBlankShare * heaviest.asked ? centre : heaviest;
 }
 
 }  // namespace hilbrush

@@ -70,8 +70,14 @@ class Stratum {
 /// No stratum's mass is such that a place which asks for so much is blank beside it.
 bool is_surely_painted(double asked);
 
+/// A surface point, and the tone that is asked for there.
+struct PaintedPoint {
+  SurfacePoint point;
+  double asked = 0;
+};
+
 /// The stratum's centre of mass, put back on the surface; where that is blank, a painted point of its heaviest bit.
-SurfacePoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles, const StratumPart& part);
+PaintedPoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles, const StratumPart& part);
 
 /// A painted point of a base quad that has mass, in the triangle that has most.
 SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad);

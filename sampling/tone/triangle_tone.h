@@ -28,6 +28,8 @@ class TriangleTone {
   double asked(const Eigen::Vector2d& b) const;
   /// The wanted tone there.
   double wanted(const Eigen::Vector2d& b) const;
+  /// What is asked for is what is wanted, everywhere.
+  bool is_wanted_asked() const { return is_wanted_asked_; }
 
   /// Exact (but for rounding) over a convex polygon; its corners by second and third barycentric coordinate, in either
   /// sense of rotation. Thread-safe.
@@ -49,8 +51,8 @@ class TriangleTone {
   std::uint32_t triangle_ = 0;
   const ToneField* field_ = nullptr;
   double space_ = 0;
-  bool is_wanted_asked_ = false;  ///< what is asked for is what is wanted
-  double tone_ = 0;               ///< of kConstant
+  bool is_wanted_asked_ = false;
+  double tone_ = 0;  ///< of kConstant
   // Of kTexels:
   const ToneLayer* layer_ = nullptr;
   TexelAddressing addressing_;
