@@ -23,14 +23,22 @@ double cylinder_distance_m(double r, double z, double radius, double z_low, doub
   return std::sqrt(dr * dr + dz * dz);
 }
 
-/// Radius of object and table parts around an axis through the origin; `height` lifts O's origin above it.
+/// Radius of object and table parts around an axis; `height` lifts O's origin above it. The tilt axis may pass them in
+/// any direction: the radius around it is that of a ball.
 double radius_around(const TexturedMesh& mesh, const CellDescription& cell, double height, bool around_tilt) {
   const auto along = [&](double r, double z) { return around_tilt ? std::hypot(r, z + height) : r; };
   const double post = cell.fixture.post_height_m;
-  double radius = std::max(along(cell.table.plate_radius_m, -post),
-                           along(cell.table.plate_radius_m, -post - cell.table.plate_thickness_m));
+  double radius = std::max({along(cell.fixture.post_radius_m, 0), along(cell.table.plate_radius_m, -post),
+                            along(cell.table.plate_radius_m, -post - cell.table.plate_thickness_m)});
   for (const auto& p : mesh.vertices) radius = std::max(radius, along(p.head<2>().norm(), p.z()));
   return radius;
+}
+
+/// Half way between the highest and the lowest point of object and table parts, in O.
+double middle_height_m(const TexturedMesh& mesh, const CellDescription& cell) {
+  double high = 0;
+  for (const auto& p : mesh.vertices) high = std::max(high, p.z());
+  return .5 * (high - cell.fixture.post_height_m - cell.table.plate_thickness_m);
 }
 
 /// Whether links, somewhere, come near enough to what turns around the tilt axis to be looked at.
@@ -83,6 +91,8 @@ Clearance::Clearance(const TexturedMesh& mesh, const CellDescription& cell)
       links_may_touch_lens_(links_come_near_lens(cell, kSlackMaxM)),
       column_may_touch_(column_comes_near(cell, radius_around_tilt_m_, kSlackMaxM)),
       tool_radius_m_(tool_radius_m(cell)),
+      ball_height_m_(middle_height_m(mesh, cell)),
+      ball_radius_m_(radius_around(mesh, cell, -ball_height_m_, true)),
       rays_(mesh),
       distance_(mesh, field_range_m(cell, links_may_touch_, column_may_touch_)) {}
 
@@ -149,7 +159,15 @@ Clearance::BallRow Clearance::quill_row(const ToolPose& tool) const {
                .4 * radius_m);
 }
 
+bool Clearance::is_far(const BallRow& row, double margin_m) const {
+  const Eigen::Vector3d to_first = row.first_O - Eigen::Vector3d(0, 0, ball_height_m_);
+  const double along = std::clamp(-to_first.dot(row.step_O) / row.step_O.squaredNorm(), 0., row.count - 1.);
+  const double kept_m = ball_radius_m_ + row.ball_m + margin_m + 2 * distance_.error_m(row.ball_m);
+  return (to_first + along * row.step_O).squaredNorm() > kept_m * kept_m;
+}
+
 bool Clearance::keeps_margin(const BallRow& row) const {
+  if (is_far(row, kMarginM)) return true;
   const double error_m = distance_.error_m(row.ball_m);
   for (int i = 0; i < row.count;) {
     const Eigen::Vector3d p_O = row.first_O + i * row.step_O;
@@ -168,6 +186,7 @@ void Clearance::lessen(const Eigen::Vector3d& ball_O, double radius_m, Slack& sl
 }
 
 void Clearance::lessen(const BallRow& row, Slack& slack) const {
+  if (is_far(row, kSlackMaxM)) return;
   for (int i = 0; i < row.count; ++i) lessen(row.first_O + i * row.step_O, row.ball_m, slack);
 }
 

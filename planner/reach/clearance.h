@@ -90,6 +90,8 @@ class Clearance {
   BallRow lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O, double half_step_m,
                    double from_m) const;
   BallRow quill_row(const ToolPose& tool) const;
+  /// Whether a whole row keeps so much from the ball around everything: what is farther away needs no look-up.
+  bool is_far(const BallRow& row, double margin_m) const;
   /// Whether a whole row keeps the margin; slices inside a free ball are passed over.
   bool keeps_margin(const BallRow& row) const;
   void lessen(const BallRow& row, Slack& slack) const;
@@ -114,6 +116,8 @@ class Clearance {
   bool links_may_touch_ = false, links_may_touch_lens_ = false;
   bool column_may_touch_ = false;  ///< ... the object or the table
   double tool_radius_m_;           ///< horizontally, of all that goes with the flange, around its axis
+  /// The ball around object, post and plate; its centre is on the axis of C.
+  double ball_height_m_, ball_radius_m_;
   ObjectRays rays_;
   ObjectDistance distance_;
 };

@@ -66,6 +66,21 @@ TEST(Clearance, FieldAgreesWithABundleOfRays) {
   EXPECT_GT(touching, looks / 20);
 }
 
+/// A small object on a wide post: what no part of the object is near to is not far from everything.
+TEST(Clearance, ThePostCountsHoweverWideItIs) {
+  CellDescription cell = default_cell();
+  cell.fixture.post_radius_m = .06;
+  cell.table.plate_radius_m = .02;
+  const Clearance clearance(ball(.005), cell);
+  const auto quill_over = [&](double x, double z) {
+    const Vector3d beam_O(1, 0, 0);
+    return clearance.quill_obstruction({Vector3d(x, 0, z) + cell.arm.flange_to_focus_m * beam_O, beam_O, {0, 0, 1}});
+  };
+  EXPECT_EQ(quill_over(.058, -.002), Obstruction::kQuillTable);
+  EXPECT_EQ(quill_over(.058, .03), Obstruction::kNone);
+  EXPECT_EQ(quill_over(.3, -.002), Obstruction::kNone);
+}
+
 /// Anywhere within the axes' limits.
 Joints any_joints(const CellDescription& cell, std::mt19937& random) {
   Joints joints;
