@@ -280,17 +280,12 @@ TEST(CellFile, TheShippedCellIsCalibratedForAllThatAJobCanName) {
   const CellDescription cell = load_cell(shipped("default"));
   for (const char* sampler :
        {"centroid", "jittered", "even", "random", "halton", "hammersley", "sobol", "niederreiter", "blue"})
-    for (int levels = 1; levels <= 4; ++levels) {
-      std::string warning;
-      tone_options(cell, {.sampler = sampler, .curve = "hilbert", .levels = levels, .spot_pitches = 1.41}, warning);
-      EXPECT_EQ(warning, "") << sampler << ' ' << levels;
-    }
-  for (const char* sampler : {"centroid", "jittered", "even", "random", "halton", "hammersley", "sobol"})
-    for (int levels = 1; levels <= 4; ++levels) {
-      std::string warning;
-      tone_options(cell, {.sampler = sampler, .curve = "peano2", .levels = levels, .spot_pitches = 1.41}, warning);
-      EXPECT_EQ(warning, "") << sampler << " on peano2 " << levels;
-    }
+    for (const char* curve : {"hilbert", "peano2"})
+      for (int levels = 1; levels <= 4; ++levels) {
+        std::string warning;
+        tone_options(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = 1.41}, warning);
+        EXPECT_EQ(warning, "") << sampler << " on " << curve << ' ' << levels;
+      }
   std::string warning;
   tone_options(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}, warning);
   EXPECT_EQ(warning, "");
