@@ -24,14 +24,14 @@ double density_on_square(const Sheet& sheet, const TriangleTone& tone, const She
 }
 
 template <class Curve>
-void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass* pieces) {
+void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass* pieces, double& painted_area_m2) {
   constexpr int kDimensions = kDimensionsOf<Curve>;
   const Sheet& sheet = mass.sheet_of(result);
   const BaseQuad& quad = mass.base_quad(result);
-  result.depth = quad.depth;
   double total = 0, squares = 0;
   for (std::uint32_t i = 0; i < quad.face_count; ++i) {
     const SheetFace& face = sheet.face_of(quad, i);
+    pieces[i].triangle = face.triangle;
     const TriangleTone tone = mass.tone.on(face.triangle);
     if (tone.is_blank()) continue;
     auto piece = whole_piece<kDimensions>(sheet, mass.curve.mesh, face);
@@ -39,10 +39,9 @@ void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass*
     const ToneIntegral integral = integrate(tone, piece);
     if (!(integral.mass > 0)) continue;
     const Eigen::Vector2d centre = integral.first / integral.mass;
-    pieces[i] = {integral.mass, centre.cast<float>(), static_cast<float>(integral.area_m2),
-                 static_cast<float>(integral.square)};
+    pieces[i] = {integral.mass, static_cast<float>(integral.square), face.triangle, centre.cast<float>()};
     total += integral.mass;
-    result.painted_area_m2 += integral.area_m2;
+    painted_area_m2 += integral.area_m2;
     result.moment_O +=
         integral.mass * position(mass.curve.mesh, {face.triangle, {1 - centre.sum(), centre.x(), centre.y()}});
     if constexpr (kDimensions == 2) squares += integral.square * density_on_square(sheet, tone, face);
@@ -64,27 +63,35 @@ CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
   CHECK(&curve.mesh() == &tone.mesh());
   Implementation& mass = *implementation_;
   std::size_t piece_count = 0;
-  for (std::uint32_t s = 0; s < mass.curve.sheets.size(); ++s) {
-    mass.first_piece.push_back(piece_count);
-    piece_count += mass.curve.sheets[s].face_lists.size();
-    for (std::uint32_t q = 0; q < mass.curve.sheets[s].base_quads.size(); ++q) mass.quads.push_back({s, q});
-  }
+  for (std::uint32_t s = 0; s < mass.curve.sheets.size(); ++s)
+    for (std::uint32_t q = 0; q < mass.curve.sheets[s].base_quads.size(); ++q) {
+      const BaseQuad& base = mass.curve.sheets[s].base_quads[q];
+      QuadMass& quad = mass.quads.emplace_back();
+      quad.sheet = s;
+      quad.quad = q;
+      quad.first_piece = static_cast<std::uint32_t>(piece_count);
+      quad.piece_count = base.face_count;
+      quad.depth = base.depth;
+      piece_count += base.face_count;
+    }
+  CHECK_LE(piece_count, std::numeric_limits<std::uint32_t>::max());
   mass.pieces.resize(piece_count);
+  std::vector<double> painted_area_m2(mass.quads.size(), 0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mass.quads.size(), kGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       QuadMass& quad = mass.quads[i];
-      PieceMass* pieces = mass.pieces.data() + (mass.pieces_of(quad) - mass.pieces.data());
-      with_curve(mass.sheet_of(quad).kind, [&]<class Curve>(Curve) { measure<Curve>(mass, quad, pieces); });
+      PieceMass* pieces = mass.pieces.data() + quad.first_piece;
+      with_curve(mass.sheet_of(quad).kind,
+                 [&]<class Curve>(Curve) { measure<Curve>(mass, quad, pieces, painted_area_m2[i]); });
     }
   });
   mass.painted_area_m2.assign(mass.curve.sheets.size(), 0);
   mass.mass_before.assign(mass.quads.size() + 1, 0);
   for (std::size_t i = 0; i < mass.quads.size(); ++i) {
     const QuadMass& quad = mass.quads[i];
-    const PieceMass* pieces = mass.pieces_of(quad);
     double sum = 0;
-    for (std::uint32_t k = 0; k < mass.base_quad(quad).face_count; ++k) sum += pieces[k].mass;
-    mass.painted_area_m2[quad.sheet] += quad.painted_area_m2;
+    for (const PieceMass& piece : mass.pieces_of(quad)) sum += piece.mass;
+    mass.painted_area_m2[quad.sheet] += painted_area_m2[i];
     mass.mass_before[i + 1] = mass.mass_before[i] + sum;
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "sampling/curve/surface_curve.h"
@@ -8,21 +9,23 @@
 /// What CurveMass keeps.
 namespace hilbrush {
 
-/// The integrals over what a base quad cuts out of one triangle. The mass is exact; the rest only places and decides.
+/// What a base quad cuts out of one triangle. The mass is exact; the rest only places and decides.
 struct PieceMass {
-  double mass = 0;                                     ///< m^2 of asked coverage
+  double mass = 0;             ///< m^2 of asked coverage
+  float square = 0;            ///< as ToneIntegral
+  std::uint32_t triangle = 0;  ///< here as well as in the face list: places are looked for among quads far apart
   Eigen::Vector2f centre_b = Eigen::Vector2f::Zero();  ///< centre of mass
-  float area_m2 = 0, square = 0;                       ///< as ToneIntegral
 
-  ToneIntegral integral() const { return {area_m2, mass, mass * centre_b.cast<double>(), square}; }
+  /// Over a piece of this area.
+  ToneIntegral integral(double area_m2) const { return {area_m2, mass, mass * centre_b.cast<double>(), square}; }
 };
 
 struct QuadMass {
   std::uint32_t sheet = 0, quad = 0;
+  std::uint32_t first_piece = 0, piece_count = 0;  ///< in `pieces`, one for each of the base quad's faces
   /// Bound on the mass that lies elsewhere than if the quad's were spread evenly over its square.
   float misplaced = std::numeric_limits<float>::infinity();
   std::uint32_t depth = 0;
-  double painted_area_m2 = 0;                          ///< of the pieces that ask for dots
   Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times place
 };
 
@@ -31,17 +34,16 @@ struct CurveMass::Implementation {
 
   const SurfaceCurve::Implementation& curve;
   const ToneField& tone;
-  std::vector<QuadMass> quads;           ///< all base quads, in order of the curve
-  std::vector<double> mass_before;       ///< mass_before[i] .. mass_before[i + 1] is quad i's stretch
-  std::vector<PieceMass> pieces;         ///< of all face lists, one sheet after another
-  std::vector<std::size_t> first_piece;  ///< of each sheet
-  std::vector<double> painted_area_m2;   ///< of each sheet
+  std::vector<QuadMass> quads;          ///< all base quads, in order of the curve
+  std::vector<double> mass_before;      ///< mass_before[i] .. mass_before[i + 1] is quad i's stretch
+  std::vector<PieceMass> pieces;        ///< of all quads
+  std::vector<double> painted_area_m2;  ///< of each sheet: of the pieces that ask for dots
 
   double total() const { return mass_before.back(); }
   const Sheet& sheet_of(const QuadMass& quad) const { return curve.sheets[quad.sheet]; }
   const BaseQuad& base_quad(const QuadMass& quad) const { return sheet_of(quad).base_quads[quad.quad]; }
-  const PieceMass* pieces_of(const QuadMass& quad) const {
-    return pieces.data() + first_piece[quad.sheet] + base_quad(quad).first_face;
+  std::span<const PieceMass> pieces_of(const QuadMass& quad) const {
+    return {pieces.data() + quad.first_piece, quad.piece_count};
   }
   double mass_of(std::size_t quad) const { return mass_before[quad + 1] - mass_before[quad]; }
   /// The quad in whose stretch `at` lies.

@@ -167,20 +167,13 @@ class CentreWriter : public DotWriter {
     add_pieces(walk, node, from, to);
   }
 
-  /// A stratum that lies in one patch as a whole: all there is to say of an even one is where its middle is.
+  /// Strata that lie in one patch as a whole: all there is to say of those in an even one is where their middles are.
   template <class Curve>
-  void add_stratum(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
-                   double to, std::uint64_t index) {
+  void add_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind,
+                  std::span<const double> ends, std::uint64_t index) {
     if constexpr (QuadWalk<Curve>::kDimensions == 2)
-      if (kind == PatchKind::kEven && to > from) {
-        const Lifted lifted = lift(walk, mean_place(node, from, to), likely_frame_);
-        const SurfacePoint middle = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
-        last_quad_ = walk.quad();
-        const double asked = triangles_[middle.triangle].asked(middle.barycentric);
-        if (is_surely_painted(asked)) return put_at(middle, walk.sheet(), asked);
-      }
-    add(walk, node, kind, from, to);
-    close(index);
+      if (kind == PatchKind::kEven) return add_even_strata(walk, node, ends, index);
+    add_one_by_one(*this, walk, node, kind, ends, index);
   }
 
   void close(std::uint64_t) {
@@ -193,6 +186,28 @@ class CentreWriter : public DotWriter {
   }
 
  private:
+  /// Step by step for all of them, so that one need not wait for another.
+  template <class Curve>
+  void add_even_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
+                       std::span<const double> ends, std::uint64_t index) {
+    last_quad_ = walk.quad();
+    const int steps = curve_steps(node.mass / plan_.rule.dot_mass);
+    moments_.clear();
+    for (const double end : ends) moments_.push_back(curve_moment(node.curve, end, steps));
+    for (std::size_t i = 1; i < ends.size(); ++i, ++index) {
+      const Vector2d middle = (moments_[i] - moments_[i - 1]) / (ends[i] - ends[i - 1]);
+      const Lifted lifted = lift(walk, node.low + node.size * middle, likely_frame_);
+      const SurfacePoint point = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
+      const double asked = triangles_[point.triangle].asked(point.barycentric);
+      if (is_surely_painted(asked)) {
+        put_at(point, walk.sheet(), asked);
+      } else {
+        add_even(walk, node, ends[i - 1], ends[i]);
+        close(index);
+      }
+    }
+  }
+
   /// Of a stretch of an even patch, on the square.
   template <class Node>
   Vector2d mean_place(const Node& node, double from, double to) {
@@ -276,7 +291,8 @@ class CentreWriter : public DotWriter {
 
   Stratum stratum_;
   CurveStretches stretches_;
-  bool is_new_ = true;  ///< nothing was added to the part before this patch
+  std::vector<Vector2d> moments_;  ///< of add_even_strata
+  bool is_new_ = true;             ///< nothing was added to the part before this patch
   std::size_t last_quad_ = 0;
 };
 

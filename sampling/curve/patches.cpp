@@ -78,10 +78,9 @@ struct Stretches {
   }
   void close(std::uint64_t index) { stratum = index + 1; }
   template <class Curve>
-  void add_stratum(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
-                   double to, std::uint64_t index) {
-    add(walk, node, kind, from, to);
-    close(index);
+  void add_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind,
+                  std::span<const double> ends, std::uint64_t index) {
+    add_one_by_one(*this, walk, node, kind, ends, index);
   }
 };
 

@@ -14,7 +14,7 @@ const typename QuadWalk<Curve>::Held& QuadWalk<Curve>::heaviest(const Node& node
 template <class Curve>
 void QuadWalk<Curve>::hold_pieces(const QuadMass& quad, const BaseQuad& base, Node& node) {
   const Sheet& sheet = mass_.sheet_of(quad);
-  const PieceMass* pieces = mass_.pieces_of(quad);
+  const std::span<const PieceMass> pieces = mass_.pieces_of(quad);
   held_count_ = 0;
   roots_.clear();
   for (std::uint32_t i = 0; i < base.face_count; ++i) {
@@ -22,10 +22,9 @@ void QuadWalk<Curve>::hold_pieces(const QuadMass& quad, const BaseQuad& base, No
     roots_.push_back(static_cast<std::uint32_t>(held_count_));
     Held& held = push();
     held.frame = i;
-    held.integral = pieces[i].integral();
     held.piece = whole_piece<kDimensions>(sheet, mass_.curve.mesh, sheet.face_of(base, i));
     clip_to_box<kDimensions>(held.piece, node.low, node.size);
-    held.integral.area_m2 = held.piece.area_b() * frame(i).space;
+    held.integral = pieces[i].integral(held.piece.area_b() * frame(i).space);
   }
   node.pieces = roots_;
 }

@@ -1,8 +1,10 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <tuple>
 #include <vector>
 
@@ -33,12 +35,23 @@ struct DotPlan {
   std::optional<Sequence> sequence;  ///< where along the curve; nothing: at the centres of strata
 };
 
+/// add_strata() by add() and close().
+template <class Consumer, class Walk, class Node>
+void add_one_by_one(Consumer& consumer, const Walk& walk, const Node& node, PatchKind kind,
+                    std::span<const double> ends, std::uint64_t index) {
+  for (std::size_t i = 1; i < ends.size(); ++i) {
+    consumer.add(walk, node, kind, ends[i - 1], ends[i]);
+    consumer.close(index++);
+  }
+}
+
 /// Cuts strata `first` to `last` - 1 out of patches, and tells `consumer`:
 ///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as shares of
 ///                                                        its mass
 ///   void close(std::uint64_t index)                      it is complete
-///   void add_stratum(walk, node, kind, double from, double to, std::uint64_t index)   both at once: a stratum in one
-///   patch
+///   void add_strata(walk, node, kind, std::span<const double> ends, std::uint64_t index)   whole strata in one patch,
+///   from
+///                                                        end to end, `index` the first: all of the above at once
 template <class Consumer>
 class StrataCutter {
  public:
@@ -62,14 +75,18 @@ class StrataCutter {
   void take(const Walk& walk, const Node& node, PatchKind kind) {
     cut(
         node.at, node.mass, [&](double from, double to) { consumer_.add(walk, node, kind, from, to); },
-        [&](double from, double to) { consumer_.add_stratum(walk, node, kind, from, to, index_); });
+        [&](std::span<const double> ends, std::uint64_t index) {
+          consumer_.add_strata(walk, node, kind, ends, index);
+        });
   }
   /// A base quad too light to be looked into.
   void take_quad(std::size_t quad, double at, double mass) {
     const auto add = [&](double from, double to) { consumer_.add_quad(quad, from, to); };
-    cut(at, mass, add, [&](double from, double to) {
-      add(from, to);
-      consumer_.close(index_);
+    cut(at, mass, add, [&](std::span<const double> ends, std::uint64_t index) {
+      for (std::size_t i = 1; i < ends.size(); ++i) {
+        add(ends[i - 1], ends[i]);
+        consumer_.close(index++);
+      }
     });
   }
 
@@ -79,21 +96,34 @@ class StrataCutter {
   }
 
  private:
-  template <class Add, class AddStratum>
-  void cut(double at, double mass, Add add, AddStratum add_stratum) {
+  /// So many whole strata are told of at once.
+  static constexpr std::size_t kTogether = 32;
+
+  template <class Add, class AddStrata>
+  void cut(double at, double mass, Add add, AddStrata add_strata) {
+    const auto is_next_here = [&] { return next_ < at + mass && !is_done(); };
     double share = 0;
-    bool begins_here = false;  // the current stratum
-    for (; next_ < at + mass && !is_done(); begins_here = true) {
-      const double next = std::clamp((next_ - at) / mass, share, 1.);
-      if (begins_here && next > share) {
-        add_stratum(share, next);
+    const auto share_of_next = [&] { return std::clamp((next_ - at) / mass, share, 1.); };
+    if (is_next_here()) {
+      const double next = share_of_next();
+      if (is_open_ && next > share) add(share, next);
+      share = next;
+      pass();
+    }
+    // From here on each begins where the one before ends.
+    while (is_next_here()) {
+      std::array<double, kTogether + 1> ends{share};
+      std::size_t count = 0;
+      const std::uint64_t first = index_;
+      while (count < kTogether && is_next_here() && share_of_next() > share) {
+        ends[++count] = share = share_of_next();
         ++index_;
         go_on();
-      } else {
-        if (is_open_ && next > share) add(share, next);
-        pass();
       }
-      share = next;
+      if (count > 0)
+        add_strata(std::span(ends).first(count + 1), first);
+      else
+        pass();  // rounding has left nothing to this one
     }
     if (is_open_ && !is_done() && share < 1) add(share, 1.);
   }

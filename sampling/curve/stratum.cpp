@@ -17,21 +17,16 @@ constexpr double kSurelyPainted = .01;
 /// Of a base quad's faces with mass, the point nearest to `target_O`.
 SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t quad_index,
                              const Eigen::Vector3d& target_O) {
-  const QuadMass& quad = mass.quads[quad_index];
-  const BaseQuad& base = mass.base_quad(quad);
-  const Sheet& sheet = mass.sheet_of(quad);
+  const std::span<const PieceMass> pieces = mass.pieces_of(mass.quads[quad_index]);
   const TexturedMesh& mesh = mass.curve.mesh;
   // With few dots on a large mesh nothing of it is in the cache: all is sent for before any of it is waited for.
-  for (std::uint32_t i = 0; i < base.face_count; ++i)
-    __builtin_prefetch(&mesh.triangles[sheet.face_of(base, i).triangle]);
-  for (std::uint32_t i = 0; i < base.face_count; ++i)
-    for (const std::uint32_t vertex : mesh.triangles[sheet.face_of(base, i).triangle])
-      __builtin_prefetch(&mesh.vertices[vertex]);
-  const PieceMass* pieces = mass.pieces_of(quad);
+  for (const PieceMass& piece : pieces) __builtin_prefetch(&mesh.triangles[piece.triangle]);
+  for (const PieceMass& piece : pieces)
+    for (const std::uint32_t vertex : mesh.triangles[piece.triangle]) __builtin_prefetch(&mesh.vertices[vertex]);
   NearestPoint nearest{{}, std::numeric_limits<double>::infinity()};
-  for (std::uint32_t i = 0; i < base.face_count; ++i) {
-    if (!(pieces[i].mass > 0)) continue;
-    const NearestPoint there = nearest_in_triangle(mesh, sheet.face_of(base, i).triangle, target_O);
+  for (const PieceMass& piece : pieces) {
+    if (!(piece.mass > 0)) continue;
+    const NearestPoint there = nearest_in_triangle(mesh, piece.triangle, target_O);
     if (there.distance2 < nearest.distance2) nearest = there;
   }
   return nearest.point;
@@ -49,6 +44,7 @@ std::size_t nearest_quad(const CurveMass::Implementation& mass, const StratumPar
     const double distance = (mass.quads[q].moment_O - quad_mass * target_O).squaredNorm();
     if (distance * mass_of_nearest < least * quad_mass * quad_mass) {
       nearest = q;
+      __builtin_prefetch(mass.pieces.data() + mass.quads[q].first_piece);  // what nearest_in_quad asks for
       least = distance;
       mass_of_nearest = quad_mass * quad_mass;
     }
@@ -68,22 +64,20 @@ SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t q
   const QuadMass& quad = mass.quads[quad_index];
   const BaseQuad& base = mass.base_quad(quad);
   const Sheet& sheet = mass.sheet_of(quad);
-  const PieceMass* pieces = mass.pieces_of(quad);
-  const auto i = static_cast<std::uint32_t>(
-      std::max_element(pieces, pieces + base.face_count,
-                       [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; }) -
-      pieces);
-  const SheetFace& face = sheet.face_of(base, i);
-  const SurfacePoint centre = surface_point(face.triangle, pieces[i].centre_b.cast<double>());
+  const std::span<const PieceMass> pieces = mass.pieces_of(quad);
+  const auto heaviest =
+      std::ranges::max_element(pieces, [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; });
+  const SurfacePoint centre = surface_point(heaviest->triangle, heaviest->centre_b.cast<double>());
   if (mass.tone.asked(centre) > 0) return centre;
   std::vector<Eigen::Vector2d> polygon;
   with_curve(sheet.kind, [&]<class Curve>(Curve) {
     constexpr int kDimensions = kDimensionsOf<Curve>;
+    const SheetFace& face = sheet.face_of(base, static_cast<std::uint32_t>(heaviest - pieces.begin()));
     auto piece = whole_piece<kDimensions>(sheet, mass.curve.mesh, face);
     clip_to_box<kDimensions>(piece, base.low.template head<kDimensions>(), base.size);
     for (const auto& corner : piece.all()) polygon.push_back(corner.b);
   });
-  return point_with_tone(mass.tone, face.triangle, polygon);
+  return point_with_tone(mass.tone, heaviest->triangle, polygon);
 }
 
 bool is_surely_painted(double asked) {
