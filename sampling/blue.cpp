@@ -47,7 +47,8 @@ constexpr std::size_t kPulls = 4;
 /// sum.
 double reach_of(const PlacedStratum& stratum) {
   // The kernel of two dots that are as unequal as may be reaches furthest beyond the sum of equal ones.
-  static const double kMostReach = std::sqrt(PairKernel(1., kMostUnequal).support2()) / (1 + kMostUnequal);
+  static const double kMostReach =
+      std::sqrt(static_cast<double>(PairKernel(1., kMostUnequal).support2)) / (1 + kMostUnequal);
   return stratum.radius_m + kMostReach * stratum.spacing_m;
 }
 
@@ -65,7 +66,8 @@ IndexLists find_neighbours(const SurfaceCurve& curve, const PlacedStrata& strata
     const PlacedStratum &a = strata.strata[i], &b = strata.strata[j];
     const double ratio = a.spacing_m / b.spacing_m;
     if (!(ratio < kMostUnequal && ratio * kMostUnequal > 1)) return false;
-    const double reach = std::sqrt(PairKernel(a.spacing_m, b.spacing_m).support2()) + a.radius_m + b.radius_m;
+    const double reach =
+        static_cast<double>(std::sqrt(PairKernel(a.spacing_m, b.spacing_m).support2)) + a.radius_m + b.radius_m;
     if (!((a.middle_O - b.middle_O).squaredNorm() < reach * reach)) return false;
     if (a.normal_O.dot(b.normal_O) > 0) return true;
     const SurfacePlace& from = first_place(std::min(i, j));
@@ -117,20 +119,18 @@ class Relaxation {
   const std::vector<SurfacePlace>& dots() const { return dots_; }
 
  private:
-  /// Where the surface of a stratum pulls from, and how strongly.
-  struct Pull {
-    Vector3d position_O;
-    double share = 0;
-  };
-
   void find_pulls(std::size_t i) {
     constexpr std::size_t kTogether = kPlacesAStratum / kPulls;
     for (std::size_t k = 0; k < kPulls; ++k) {
       Vector3d sum = Vector3d::Zero();
       int count = 0;
       for (std::size_t p = k * kTogether; p < (k + 1) * kTogether; ++p)
-        if (is_open(i, p)) sum += strata_.place(i, p).position_O, ++count;
-      if (count > 0) pulls_[i][k] = {sum / count, static_cast<double>(count) / kPlacesAStratum};
+        if (is_open(i, p)) sum += strata_.place(i, p).position_O - strata_.strata[i].middle_O, ++count;
+      if (count == 0) continue;
+      const Eigen::Vector3f place = (sum / count).cast<float>();
+      const auto row = static_cast<Eigen::Index>(k);
+      pulls_[i].x[row] = place.x(), pulls_[i].y[row] = place.y(), pulls_[i].z[row] = place.z();
+      pulls_[i].share[row] = static_cast<float>(count) / kPlacesAStratum;
     }
   }
 
@@ -145,9 +145,12 @@ class Relaxation {
     return {strata_.strata[i].spacing_m, strata_.strata[j].spacing_m};
   }
   /// The surface of j pulls at i.
-  template <class Sum>
-  void add_pulls(Sum& sum, const PairKernel& kernel, std::size_t j) const {
-    for (const Pull& pull : pulls_[j]) sum.add(kernel, pull.position_O, -static_cast<float>(pull.share));
+  void add_pulls(PlaceSums& sum, const PairKernel& kernel, std::size_t j) const {
+    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(kPulls); ++k)
+      sum.add(kernel, strata_.strata[j].middle_O + pulls_[j].place(k), -pulls_[j].share[k]);
+  }
+  void add_pulls(TangentSlope& slope, const PairKernel& kernel, std::size_t j) const {
+    slope.add(kernel, strata_.strata[j].middle_O, pulls_[j], -1);
   }
 
   PlaceSums::Sums pull_of_places(std::size_t i) const {
@@ -176,9 +179,9 @@ class Relaxation {
     add_pulls(slope, kernel_of(i, i), i);
     for (const std::uint32_t j : neighbours_[i]) {
       const PairKernel kernel = kernel_of(i, j);
-      slope.add(kernel, dots_[j].position_O, 1);
+      slope.add(kernel, dots_[j].position_O);
       // Many a neighbour's surface is out of reach of this one place of the stratum.
-      const double reach = std::sqrt(kernel.support2()) + strata_.strata[j].radius_m;
+      const double reach = static_cast<double>(std::sqrt(kernel.support2)) + strata_.strata[j].radius_m;
       if ((strata_.strata[j].middle_O - here_O).squaredNorm() < reach * reach) add_pulls(slope, kernel, j);
     }
     const double h = strata_.strata[i].spacing_m;
@@ -246,8 +249,10 @@ class Relaxation {
       const double least =
           kNearest * kDensestSpacing * .5 * (strata_.strata[i].spacing_m + strata_.strata[j].spacing_m);
       const Vector3d way = here_O - dots_[j].position_O;
-      const double distance = way.norm();
-      if (least - distance <= worst || !(distance > 0)) continue;
+      const double squared = way.squaredNorm();
+      if (squared >= least * least || !(squared > 0)) continue;
+      const double distance = std::sqrt(squared);
+      if (least - distance <= worst) continue;
       worst = least - distance;
       away = worst / distance * way;
     }
@@ -269,7 +274,7 @@ class Relaxation {
   const PlacedStrata& strata_;
   const IndexLists neighbours_;
   const Colouring colouring_;
-  std::vector<std::array<Pull, kPulls>> pulls_;
+  std::vector<FourPulls> pulls_;  ///< where the surface of a stratum pulls from, and how strongly
   std::vector<std::vector<Vector3d>> border_;
   std::vector<SurfacePlace> dots_;
 };

@@ -4,14 +4,16 @@
 
 namespace hilbrush {
 
-Eigen::Vector2f TangentSlope::newton_step(float least) const {
-  const float mean = .5f * (xx_ + yy_), half = .5f * (xx_ - yy_);
-  const float spread = std::hypot(half, xy_), turn = .5f * std::atan2(xy_, half);
-  const Eigen::Vector2f axis(std::cos(turn), std::sin(turn)), other(-axis.y(), axis.x());
-  const auto along = [&](const Eigen::Vector2f& direction, float curvature) {
-    return Eigen::Vector2f(-gradient_.dot(direction) / std::max(std::abs(curvature), least) * direction);
-  };
-  return along(axis, mean + spread) + along(other, mean - spread);
+Eigen::Vector2f TangentSlope::newton_step(float least) {
+  add_waiting();
+  const float x = gradient_x_.sum(), y = gradient_y_.sum(), xx = xx_.sum(), xy = xy_.sum(), yy = yy_.sum();
+  // The Hessian is mean + spread along one axis and mean - spread along the other; so is what is made of it here, with
+  // the same axes: along them + spread and - spread is (half, xy; xy, -half).
+  const float mean = .5f * (xx + yy), half = .5f * (xx - yy), spread = std::sqrt(half * half + xy * xy);
+  const auto step_along = [&](float curvature) { return 1 / std::max(std::abs(curvature), least); };
+  const float one = step_along(mean + spread), other = step_along(mean - spread);
+  const float both = .5f * (one + other), apart = spread > 0 ? .5f * (one - other) / spread : 0;
+  return {-both * x - apart * (half * x + xy * y), -both * y - apart * (xy * x - half * y)};
 }
 
 }  // namespace hilbrush

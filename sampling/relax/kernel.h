@@ -20,11 +20,11 @@ struct PairKernel {
   PairKernel(double h, double k)
       : PairKernel(static_cast<float>(h), static_cast<float>(k), static_cast<float>(h * h + k * k)) {}
   PairKernel(float h, float k, float sum2)
-      : weight(2 * h * k / sum2), inverse_square(1 / (static_cast<float>(kExponent) * kSigma2 * sum2)) {}
+      : weight(2 * h * k / sum2),
+        support2(static_cast<float>(kExponent) * kSigma2 * sum2),
+        inverse_square(1 / support2) {}
 
-  double support2() const { return 1. / static_cast<double>(inverse_square); }
-
-  float weight, inverse_square;
+  float weight, support2, inverse_square;
 };
 
 /// Sums of kernels at all places of a stratum at a time.
@@ -53,34 +53,64 @@ class PlaceSums {
   Sums x_, y_, z_, sums_ = Sums::Zero();
 };
 
-/// Gradient and Hessian of a sum of kernels at one place, along two directions of its tangent plane.
+/// Four numbers side by side.
+using Four = Eigen::Array4f;
+
+/// Four places on the surface of a stratum, from its middle, each with the share of the stratum's surface that it
+/// stands for (0: none).
+struct FourPulls {
+  Four x = Four::Zero(), y = Four::Zero(), z = Four::Zero(), share = Four::Zero();
+
+  Eigen::Vector3d place(Eigen::Index k) const { return Eigen::Vector3f(x[k], y[k], z[k]).cast<double>(); }
+};
+
+/// Gradient and Hessian of a sum of kernels at one place, along two directions of its tangent plane. Kernels are summed
+/// four side by side.
 class TangentSlope {
  public:
   TangentSlope(const Eigen::Vector3d& place_O, const Eigen::Vector3d& x_O, const Eigen::Vector3d& y_O)
       : place_O_(place_O), x_(x_O.cast<float>()), y_(y_O.cast<float>()) {}
 
-  void add(const PairKernel& kernel, const Eigen::Vector3d& position_O, float factor) {
+  /// A kernel at `position_O`.
+  void add(const PairKernel& kernel, const Eigen::Vector3d& position_O) {
     const Eigen::Vector3f way = (place_O_ - position_O).cast<float>();
-    const float u = 1 - kernel.inverse_square * way.squaredNorm();
-    if (!(u > 0)) return;
-    const float x = way.dot(x_), y = way.dot(y_), u4 = u * u * u * u;
-    const float second = 120 * kernel.inverse_square * kernel.inverse_square * factor * kernel.weight * u4;
-    const float first = second * u / (10 * kernel.inverse_square);
-    gradient_.x() -= first * x;
-    gradient_.y() -= first * y;
+    waiting_.row(count_) << way.x(), way.y(), way.z(), kernel.inverse_square, kernel.weight;
+    if (++count_ == 4) add_waiting();
+  }
+  /// Kernels at the places of a stratum, times their shares and `factor`.
+  void add(const PairKernel& kernel, const Eigen::Vector3d& middle_O, const FourPulls& pulls, float factor) {
+    const Eigen::Vector3f way = (place_O_ - middle_O).cast<float>();
+    add(way.x() - pulls.x, way.y() - pulls.y, way.z() - pulls.z, Four::Constant(kernel.inverse_square),
+        factor * kernel.weight * pulls.share);
+  }
+
+  /// One Newton step, down along both axes of curvature; curvatures nearer to zero than `least` count as that much.
+  Eigen::Vector2f newton_step(float least);
+
+ private:
+  void add_waiting() {
+    add(waiting_.col(0), waiting_.col(1), waiting_.col(2), waiting_.col(3), waiting_.col(4));
+    waiting_.setZero();
+    count_ = 0;
+  }
+  void add(const Four& way_x, const Four& way_y, const Four& way_z, const Four& inverse_square, const Four& weight) {
+    const Four u = (1 - inverse_square * (way_x * way_x + way_y * way_y + way_z * way_z)).max(0.f), u2 = u * u;
+    const Four x = way_x * x_.x() + way_y * x_.y() + way_z * x_.z();
+    const Four y = way_x * y_.x() + way_y * y_.y() + way_z * y_.z();
+    const Four u4 = 12 * inverse_square * weight * u2 * u2, first = u4 * u, second = 10 * inverse_square * u4;
+    gradient_x_ -= first * x;
+    gradient_y_ -= first * y;
     xx_ += second * x * x - first;
     xy_ += second * x * y;
     yy_ += second * y * y - first;
   }
 
-  /// One Newton step, down along both axes of curvature; curvatures nearer to zero than `least` count as that much.
-  Eigen::Vector2f newton_step(float least) const;
-
- private:
   Eigen::Vector3d place_O_;
   Eigen::Vector3f x_, y_;
-  Eigen::Vector2f gradient_ = Eigen::Vector2f::Zero();
-  float xx_ = 0, xy_ = 0, yy_ = 0;
+  Eigen::Array<float, 4, 5> waiting_ = Eigen::Array<float, 4, 5>::Zero();  ///< way, inverse square, weight
+  Eigen::Index count_ = 0;
+  Four gradient_x_ = Four::Zero(), gradient_y_ = Four::Zero();
+  Four xx_ = Four::Zero(), xy_ = Four::Zero(), yy_ = Four::Zero();
 };
 
 }  // namespace hilbrush
