@@ -49,9 +49,9 @@ void add_one_by_one(Consumer& consumer, const Walk& walk, const Node& node, Patc
 ///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as shares of
 ///                                                        its mass
 ///   void close(std::uint64_t index)                      it is complete
-///   void add_strata(walk, node, kind, std::span<const double> ends, std::uint64_t index)   whole strata in one patch,
-///   from
-///                                                        end to end, `index` the first: all of the above at once
+///   void add_strata(walk, node, kind, std::span<const double> ends, std::uint64_t index)
+///                                                        all of it at once for strata in one patch as a whole,
+///                                                        from `index` on, each between two ends
 template <class Consumer>
 class StrataCutter {
  public:

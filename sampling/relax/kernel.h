@@ -53,13 +53,11 @@ class PlaceSums {
   Sums x_, y_, z_, sums_ = Sums::Zero();
 };
 
-/// Four numbers side by side.
-using Four = Eigen::Array4f;
-
 /// Four places on the surface of a stratum, from its middle, each with the share of the stratum's surface that it
 /// stands for (0: none).
 struct FourPulls {
-  Four x = Four::Zero(), y = Four::Zero(), z = Four::Zero(), share = Four::Zero();
+  using Numbers = Eigen::Array4f;
+  Numbers x = Numbers::Zero(), y = Numbers::Zero(), z = Numbers::Zero(), share = Numbers::Zero();
 
   Eigen::Vector3d place(Eigen::Index k) const { return Eigen::Vector3f(x[k], y[k], z[k]).cast<double>(); }
 };
@@ -88,6 +86,8 @@ class TangentSlope {
   Eigen::Vector2f newton_step(float least);
 
  private:
+  using Four = FourPulls::Numbers;
+
   void add_waiting() {
     add(waiting_.col(0), waiting_.col(1), waiting_.col(2), waiting_.col(3), waiting_.col(4));
     waiting_.setZero();
