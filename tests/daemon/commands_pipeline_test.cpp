@@ -225,8 +225,9 @@ TEST_F(PipelineCommands, TheChildHasNoStandardInputAndItsOwnProcessGroup) {
 }
 
 TEST_F(PipelineCommands, InterruptEndsTheChildAndAllItStarted) {
-  use_child(
-      R"(sleep 100 & echo $! > "$folder/grandchild"; echo $$ > "$folder/pid"; echo '{"stage":"load","fraction":0.5}'; wait)");
+  // A file is there before anything is written to it; under its own name only when all is.
+  use_child(R"(sleep 100 & echo $! > "$folder/grandchild"; echo $$ > "$folder/written"
+      mv "$folder/written" "$folder/pid"; echo '{"stage":"load","fraction":0.5}'; wait)");
   // Ctrl-C as soon as the child is there; blocked in this thread, so that it can never end the test itself.
   sigset_t set, before;
   sigemptyset(&set);
