@@ -39,8 +39,6 @@ constexpr double kLongestWay = .25, kLongestStep = .15;
 constexpr double kMostUnequal = 4;
 /// Distance of neighbours in the densest packing, at unit area a dot: sqrt(2 / sqrt(3)).
 constexpr double kDensestSpacing = 1.0745699318235418;
-/// Surface pulls from so many places a stratum.
-constexpr std::size_t kPulls = 4;
 
 /// What a single dot reaches at most: two dots see each other only if the distance of their strata is less than the
 /// sum.
@@ -119,8 +117,8 @@ class Relaxation {
 
  private:
   void find_pulls(std::size_t i) {
-    constexpr std::size_t kTogether = kPlacesAStratum / kPulls;
-    for (std::size_t k = 0; k < kPulls; ++k) {
+    constexpr std::size_t kTogether = kPlacesAStratum / FourPulls::kCount;
+    for (std::size_t k = 0; k < FourPulls::kCount; ++k) {
       Vector3d sum = Vector3d::Zero();
       int count = 0;
       for (std::size_t p = k * kTogether; p < (k + 1) * kTogether; ++p)
@@ -145,11 +143,11 @@ class Relaxation {
   }
   /// The surface of j pulls at i.
   void add_pulls(PlaceSums& sum, const PairKernel& kernel, std::size_t j) const {
-    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(kPulls); ++k)
+    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(FourPulls::kCount); ++k)
       sum.add(kernel, strata_.strata[j].middle_O + pulls_[j].place(k), -pulls_[j].share[k]);
   }
   void add_pulls(TangentSlope& slope, const PairKernel& kernel, std::size_t j) const {
-    slope.add(kernel, strata_.strata[j].middle_O, pulls_[j], -1);
+    slope.subtract(kernel, strata_.strata[j].middle_O, pulls_[j]);
   }
 
   PlaceSums::Sums pull_of_places(std::size_t i) const {

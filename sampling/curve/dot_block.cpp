@@ -173,7 +173,8 @@ class CentreWriter : public DotWriter {
                   std::span<const double> ends, std::uint64_t index) {
     if constexpr (QuadWalk<Curve>::kDimensions == 2)
       if (kind == PatchKind::kEven) return add_even_strata(walk, node, ends, index);
-    add_one_by_one(*this, walk, node, kind, ends, index);
+    const auto add_stretch = [&](double from, double to) { add(walk, node, kind, from, to); };
+    add_one_by_one(*this, add_stretch, ends, index);
   }
 
   void close(std::uint64_t) {

@@ -80,7 +80,8 @@ struct Stretches {
   template <class Curve>
   void add_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind,
                   std::span<const double> ends, std::uint64_t index) {
-    add_one_by_one(*this, walk, node, kind, ends, index);
+    const auto add_stretch = [&](double from, double to) { add(walk, node, kind, from, to); };
+    add_one_by_one(*this, add_stretch, ends, index);
   }
 };
 

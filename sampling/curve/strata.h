@@ -35,12 +35,11 @@ struct DotPlan {
   std::optional<Sequence> sequence;  ///< where along the curve; nothing: at the centres of strata
 };
 
-/// add_strata() by add() and close().
-template <class Consumer, class Walk, class Node>
-void add_one_by_one(Consumer& consumer, const Walk& walk, const Node& node, PatchKind kind,
-                    std::span<const double> ends, std::uint64_t index) {
+/// Whole strata one after another: add(from, to) for each, and its end.
+template <class Consumer, class Add>
+void add_one_by_one(Consumer& consumer, Add add, std::span<const double> ends, std::uint64_t index) {
   for (std::size_t i = 1; i < ends.size(); ++i) {
-    consumer.add(walk, node, kind, ends[i - 1], ends[i]);
+    add(ends[i - 1], ends[i]);
     consumer.close(index++);
   }
 }
@@ -82,12 +81,8 @@ class StrataCutter {
   /// A base quad too light to be looked into.
   void take_quad(std::size_t quad, double at, double mass) {
     const auto add = [&](double from, double to) { consumer_.add_quad(quad, from, to); };
-    cut(at, mass, add, [&](std::span<const double> ends, std::uint64_t index) {
-      for (std::size_t i = 1; i < ends.size(); ++i) {
-        add(ends[i - 1], ends[i]);
-        consumer_.close(index++);
-      }
-    });
+    cut(at, mass, add,
+        [&](std::span<const double> ends, std::uint64_t index) { add_one_by_one(consumer_, add, ends, index); });
   }
 
   /// The curve is over: what rounding has left open ends here.

@@ -57,6 +57,8 @@ class PlaceSums {
 /// stands for (0: none).
 struct FourPulls {
   using Numbers = Eigen::Array4f;
+  static constexpr std::size_t kCount = 4;
+
   Numbers x = Numbers::Zero(), y = Numbers::Zero(), z = Numbers::Zero(), share = Numbers::Zero();
 
   Eigen::Vector3d place(Eigen::Index k) const { return Eigen::Vector3f(x[k], y[k], z[k]).cast<double>(); }
@@ -75,11 +77,11 @@ class TangentSlope {
     waiting_.row(count_) << way.x(), way.y(), way.z(), kernel.inverse_square, kernel.weight;
     if (++count_ == 4) add_waiting();
   }
-  /// Kernels at the places of a stratum, times their shares and `factor`.
-  void add(const PairKernel& kernel, const Eigen::Vector3d& middle_O, const FourPulls& pulls, float factor) {
+  /// Kernels at the places of a stratum, taken off by their shares.
+  void subtract(const PairKernel& kernel, const Eigen::Vector3d& middle_O, const FourPulls& pulls) {
     const Eigen::Vector3f way = (place_O_ - middle_O).cast<float>();
     add(way.x() - pulls.x, way.y() - pulls.y, way.z() - pulls.z, Four::Constant(kernel.inverse_square),
-        factor * kernel.weight * pulls.share);
+        -kernel.weight * pulls.share);
   }
 
   /// One Newton step, down along both axes of curvature; curvatures nearer to zero than `least` count as that much.

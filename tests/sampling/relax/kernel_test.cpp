@@ -68,7 +68,7 @@ TEST(TangentSlopeTest, NewtonStepIsThatOfTheEnergy) {
         pulls.share[k] = static_cast<float>(k) / 6;
         sources.push_back({middle_O + pulls.place(k), kernel, -static_cast<double>(pulls.share[k])});
       }
-      slope.add(kernel, middle_O, pulls, -1);
+      slope.subtract(kernel, middle_O, pulls);
     }
     const Vector2d expected = step_by_differences(sources, least);
     const Vector2d step = slope.newton_step(static_cast<float>(least)).cast<double>();
