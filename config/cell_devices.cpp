@@ -3,7 +3,7 @@
 #include "config/cell_file.h"
 #include "config/json_reader.h"
 #include "config/register_map_file.h"
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

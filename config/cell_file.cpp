@@ -10,7 +10,7 @@
 #include "config/cell_devices.h"
 #include "config/config_folders.h"
 #include "config/json_reader.h"
-#include "planner/sha256.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

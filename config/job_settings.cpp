@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "config/json_reader.h"
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

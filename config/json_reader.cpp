@@ -13,7 +13,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

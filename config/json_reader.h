@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 /// Strict reading of JSON that people write. Every value is asked for by key, with its range; what is not asked for is
 /// an error, and so are duplicate keys, wrong types and documents that are too large or too deep. Each error is an

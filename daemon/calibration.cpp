@@ -8,7 +8,7 @@
 #include "daemon/pipeline.h"
 #include "daemon/report.h"
 #include "daemon/wedge.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/levels.h"
 
 namespace hilbrush {

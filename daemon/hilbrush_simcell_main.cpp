@@ -13,7 +13,7 @@
 #include "config/fault_script_file.h"
 #include "config/json_reader.h"
 #include "config/wired_cell_file.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sim/devices/emission_record.h"
 #include "sim/wire/wire_cell.h"
 

@@ -16,8 +16,8 @@
 #include <string>
 
 #include "daemon/server/daemon.h"
-#include "sampling/check.h"
-#include "sampling/input_error.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 
 namespace {
 

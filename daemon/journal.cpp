@@ -8,7 +8,7 @@
 #include <span>
 #include <stdexcept>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

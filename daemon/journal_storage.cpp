@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

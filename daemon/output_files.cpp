@@ -2,7 +2,7 @@
 
 #include <fstream>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

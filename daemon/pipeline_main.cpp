@@ -14,7 +14,7 @@
 #include "daemon/pipeline.h"
 #include "daemon/quality/quality.h"
 #include "planner/program_file.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace {
 

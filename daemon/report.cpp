@@ -9,7 +9,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

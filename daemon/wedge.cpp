@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "config/json_reader.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

@@ -11,8 +11,8 @@
 #include "planner/reach/reach.h"
 #include "planner/reach/transit.h"
 #include "planner/time_model.h"
-#include "sampling/check.h"
-#include "sampling/input_error.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

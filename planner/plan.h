@@ -9,8 +9,8 @@
 
 #include "planner/exposure_program.h"
 #include "planner/plan_options.h"
+#include "sampling/base/progress.h"
 #include "sampling/dots.h"
-#include "sampling/progress.h"
 #include "sampling/textured_mesh.h"
 
 /// Dots to program, the entry of planner/:

@@ -7,8 +7,8 @@
 #include <cstdarg>
 #include <cstdio>
 
-#include "planner/angles.h"
 #include "planner/check/check_cell.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

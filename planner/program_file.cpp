@@ -9,7 +9,7 @@
 #include <limits>
 #include <system_error>
 
-#include "planner/sha256.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

@@ -7,7 +7,7 @@
 #include <bit>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/curve/sequence.h"
 #include "sampling/growing_ball.h"

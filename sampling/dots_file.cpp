@@ -5,8 +5,8 @@
 #include <cstring>
 #include <sstream>
 
-#include "sampling/check.h"
-#include "sampling/input_error.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 #include <cstdint>
 
+#include "sampling/base/progress.h"
 #include "sampling/dots.h"
-#include "sampling/progress.h"
 #include "sampling/sample.h"
 #include "sampling/tone_field.h"
 

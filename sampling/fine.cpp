@@ -7,9 +7,9 @@
 #include <numbers>
 #include <utility>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/curve/dot_triangle.h"
-#include "sampling/input_error.h"
 #include "sampling/relax/paint_model.h"
 #include "sampling/relax/surface_place.h"
 

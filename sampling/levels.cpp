@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/tone/triangle_frame.h"
 
 namespace hilbrush {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "sampling/base/input_error.h"
 #include "sampling/disk/edges.h"
-#include "sampling/input_error.h"
 #include "sampling/renumber.h"
 
 namespace hilbrush {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <string_view>
 
+#include "sampling/base/input_error.h"
 #include "sampling/files/face_list.h"
 #include "sampling/files/mesh_file.h"
 #include "sampling/files/text_lines.h"
-#include "sampling/input_error.h"
 #include "sampling/model_folder.h"
 #include "sampling/vrml/reading.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/levels.h"
 #include "sampling/tone/asked_atlas.h"
 

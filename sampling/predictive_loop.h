@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
+#include "sampling/base/progress.h"
 #include "sampling/dots.h"
-#include "sampling/progress.h"
 #include "sampling/tone.h"
 #include "sampling/tone_field.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/blue.h"
-#include "sampling/check.h"
 #include "sampling/curve/curve_mass.h"
 #include "sampling/curve/dot_block.h"
-#include "sampling/input_error.h"
 
 namespace hilbrush {
 namespace {

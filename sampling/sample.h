@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "sampling/base/progress.h"
 #include "sampling/dots.h"
-#include "sampling/progress.h"
 #include "sampling/sample_options.h"
 #include "sampling/textured_mesh.h"
 #include "sampling/tone_field.h"

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/check.h"
-#include "sampling/cross.h"
+#include "sampling/base/check.h"
+#include "sampling/base/cross.h"
 #include "sampling/tone/tone_polygon.h"
 
 namespace hilbrush {

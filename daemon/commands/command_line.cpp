@@ -14,7 +14,7 @@
 #include "daemon/commands/rpc_client.h"
 #include "daemon/server/cell_devices.h"
 #include "drivers/driver_error.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -15,7 +15,7 @@
 #include "daemon/commands/interrupt.h"
 #include "daemon/server/cell_devices.h"
 #include "drivers/driver_error.h"
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 /// What is done with a cell before a daemon drives it: look at the devices, and move one axis by a small step.
 namespace hilbrush {

@@ -5,7 +5,7 @@
 
 #include "config/json_reader.h"
 #include "daemon/commands/text_output.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 

@@ -13,7 +13,7 @@
 #include "daemon/commands/settings_flags.h"
 #include "daemon/commands/text_output.h"
 #include "daemon/commands/watch.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

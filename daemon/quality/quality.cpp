@@ -8,7 +8,7 @@
 #include "daemon/quality/figures.h"
 #include "daemon/quality/measured_set.h"
 #include "daemon/quality/plots.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "planner/sha256.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

@@ -7,7 +7,7 @@
 #include "config/cell_devices.h"
 #include "drivers/cell.h"
 #include "planner/cell_description.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 /// The devices that a cell file names, and what only simulated ones can do.
 namespace hilbrush {

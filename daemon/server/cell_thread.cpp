@@ -13,8 +13,8 @@
 
 #include "drivers/driver_error.h"
 #include "planner/program_file.h"
-#include "planner/sha256.h"
-#include "sampling/check.h"
+#include "sampling/base/check.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

@@ -15,7 +15,7 @@
 #include "daemon/server/method_table.h"
 #include "daemon/server/pipeline_child.h"
 #include "daemon/server/server.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -8,8 +8,8 @@
 #include "config/cell_file.h"
 #include "config/job_settings.h"
 #include "daemon/server/model_copy.h"
-#include "planner/sha256.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

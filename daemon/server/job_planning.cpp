@@ -2,7 +2,7 @@
 
 #include "daemon/server/job_book.h"
 #include "daemon/server/model_copy.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 /// The part of JobBook that plans: a job's files are listed, copied and planned by children, one job at a time.
 namespace hilbrush {

@@ -13,9 +13,9 @@
 #include <cstring>
 #include <string_view>
 
-#include "planner/sha256.h"
-#include "sampling/check.h"
-#include "sampling/input_error.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

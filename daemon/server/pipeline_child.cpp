@@ -20,7 +20,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

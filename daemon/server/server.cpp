@@ -24,7 +24,7 @@
 #include <utility>
 #include <vector>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <numbers>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

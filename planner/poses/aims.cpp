@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "planner/angles.h"
 #include "planner/reach/beam_directions.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

@@ -2,7 +2,7 @@
 #include <span>
 
 #include "planner/poses/posed_dots.h"
-#include "sampling/progress.h"
+#include "sampling/base/progress.h"
 
 /// The baseline that pose search is measured against: every dot is met head-on, one after another in the order given.
 /// The table turns for each of them; of the poses that bring the beam along the smooth normal, the one is taken that

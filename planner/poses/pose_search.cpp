@@ -10,7 +10,7 @@
 #include "planner/poses/ordering.h"
 #include "planner/poses/stations.h"
 #include "planner/poses/yaw_slack.h"
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

@@ -2,7 +2,7 @@
 #include <span>
 
 #include "planner/poses/posed_dots.h"
-#include "sampling/progress.h"
+#include "sampling/base/progress.h"
 
 /// A pose for each dot and the order in which dots are exposed, so that the cell takes little time at small incidence:
 ///   aims (beam directions that many dots share) -> stations (table, yaw and elbow of each aim, in the order they are

@@ -9,7 +9,7 @@
 
 #include "planner/dose.h"
 #include "planner/reach/transit.h"
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 #include "planner/poses/posed_dots.h"
-#include "sampling/progress.h"
+#include "sampling/base/progress.h"
 
 /// Poses to program: the moves between them are proven clear or led around by way-points, doses are added.
 namespace hilbrush {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "planner/angles.h"
 #include "planner/time_model.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "planner/angles.h"
 #include "planner/poses/step_cost.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "planner/angles.h"
 #include "planner/reach/reach_failure.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdio>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

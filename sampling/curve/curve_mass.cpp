@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "sampling/check.h"
-#include "sampling/cross.h"
+#include "sampling/base/check.h"
+#include "sampling/base/cross.h"
 #include "sampling/curve/quad_walk.h"
 
 namespace hilbrush {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/curve/put_on_surface.h"
 #include "sampling/curve/stratum.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

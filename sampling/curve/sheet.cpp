@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "sampling/cross.h"
+#include "sampling/base/cross.h"
 
 namespace hilbrush {
 namespace {

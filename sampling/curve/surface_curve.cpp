@@ -4,10 +4,10 @@
 #include <cmath>
 #include <utility>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/curve/lay_out.h"
 #include "sampling/disk/components.h"
-#include "sampling/input_error.h"
 
 namespace hilbrush {
 namespace {

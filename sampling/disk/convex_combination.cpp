@@ -11,7 +11,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

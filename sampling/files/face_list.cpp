@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

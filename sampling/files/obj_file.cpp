@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <map>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/files/mesh_file.h"
 #include "sampling/files/openmesh_reading.h"
 #include "sampling/files/polygon_importer.h"
 #include "sampling/files/text_lines.h"
-#include "sampling/input_error.h"
 
 /// OBJ. OpenMesh opens whatever a mtllib line names, resolves relative indices against the end of the file, loses its
 /// place at a coordinate that is no number and forgets which material a face had. So the text is first put into plain

@@ -1,8 +1,8 @@
 #include <array>
 
+#include "sampling/base/input_error.h"
 #include "sampling/files/mesh_file.h"
 #include "sampling/files/text_lines.h"
-#include "sampling/input_error.h"
 
 /// OFF. OpenMesh's reader keeps what the last file's header said when it reads from memory, and knows no comments. The
 /// PLY that an OFF means is nearly the same text, so it is written anew as one, and read as one.

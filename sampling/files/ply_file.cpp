@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <map>
 
+#include "sampling/base/input_error.h"
 #include "sampling/files/mesh_file.h"
 #include "sampling/files/openmesh_reading.h"
 #include "sampling/files/polygon_importer.h"
 #include "sampling/files/text_lines.h"
-#include "sampling/input_error.h"
 
 /// PLY. OpenMesh believes the counts of the header, knows few names, and loses its place at a list it does not know. So
 /// the header is read and written anew here; the body goes to OpenMesh as it is.

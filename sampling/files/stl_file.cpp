@@ -1,11 +1,11 @@
 #include <OpenMesh/Core/IO/reader/STLReader.hh>
 #include <cstring>
 
+#include "sampling/base/input_error.h"
 #include "sampling/files/mesh_file.h"
 #include "sampling/files/openmesh_reading.h"
 #include "sampling/files/polygon_importer.h"
 #include "sampling/files/text_lines.h"
-#include "sampling/input_error.h"
 
 /// STL. OpenMesh believes the count of a binary file, and any line of an ASCII one that holds "outer"; a coordinate
 /// that is not a number breaks the map it welds points with. So the text is put into plain form, and triangles that are

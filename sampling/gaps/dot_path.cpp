@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 

@@ -9,12 +9,12 @@
 #include <optional>
 #include <utility>
 
+#include "sampling/base/input_error.h"
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/gaps/dot_path.h"
 #include "sampling/gaps/gap_meter.h"
 #include "sampling/gaps/square_places.h"
 #include "sampling/gaps/voronoi_places.h"
-#include "sampling/input_error.h"
 
 namespace hilbrush {
 namespace {

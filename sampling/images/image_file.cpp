@@ -10,7 +10,7 @@
 #include <mutex>
 #include <string_view>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -8,10 +8,10 @@
 #include <optional>
 #include <utility>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/disk/components.h"
-#include "sampling/input_error.h"
 #include "sampling/laminar/contours.h"
 
 namespace hilbrush {

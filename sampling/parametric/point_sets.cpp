@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "sampling/base/input_error.h"
 #include "sampling/curve/sequence.h"
-#include "sampling/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/curve/curve_moment.h"
 #include "sampling/curve/sequence.h"
-#include "sampling/input_error.h"
 #include "sampling/parametric.h"
 #include "sampling/parametric/leaf_area.h"
 

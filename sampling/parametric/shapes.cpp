@@ -2,7 +2,7 @@
 #include <numbers>
 #include <utility>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/parametric.h"
 #include "sampling/parametric/jet.h"
 

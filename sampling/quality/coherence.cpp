@@ -1,7 +1,7 @@
 #include <array>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/curve/hilbert.h"
 #include "sampling/curve/peano.h"
 #include "sampling/quality.h"

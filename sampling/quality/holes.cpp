@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/quality.h"
 #include "sampling/quality/point_tree.h"
 

@@ -1,7 +1,7 @@
 #include <Eigen/LU>
 #include <numbers>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/quality.h"
 #include "sampling/quality/point_tree.h"
 #include "sampling/quality/test_shapes.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/quality/point_tree.h"
 
 namespace hilbrush {

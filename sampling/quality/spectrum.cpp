@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/quality/point_transform.h"
 
 namespace hilbrush {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/quality/point_tree.h"
 #include "sampling/quality/surface_quality.h"
 #include "sampling/quality/test_shapes.h"

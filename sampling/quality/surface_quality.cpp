@@ -8,8 +8,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "sampling/check.h"
-#include "sampling/input_error.h"
+#include "sampling/base/check.h"
+#include "sampling/base/input_error.h"
 #include "sampling/nearest_in_triangle.h"
 #include "sampling/quality/dots_on_surface.h"
 #include "sampling/quality/holes.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <unordered_set>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/nearest_in_triangle.h"
 #include "sampling/quality/point_tree.h"
 #include "sampling/quality/spectrum.h"

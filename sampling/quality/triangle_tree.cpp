@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/nearest_in_triangle.h"
 
 namespace hilbrush {

@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

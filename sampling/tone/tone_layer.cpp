@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sampling/tone/boundary_walk.h"
 
 namespace hilbrush {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "sampling/check.h"
-#include "sampling/cross.h"
+#include "sampling/base/check.h"
+#include "sampling/base/cross.h"
 #include "sampling/tone/tone_polygon.h"
 #include "sampling/tone_field.h"
 

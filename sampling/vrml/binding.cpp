@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush::vrml {
 namespace {

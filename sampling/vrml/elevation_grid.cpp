@@ -1,4 +1,4 @@
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/vrml/surfaces.h"
 
 namespace hilbrush::vrml {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/vrml/surfaces.h"
 
 namespace hilbrush::vrml {

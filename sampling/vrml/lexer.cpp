@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush::vrml {
 namespace {

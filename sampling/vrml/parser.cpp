@@ -4,7 +4,7 @@
 #include <array>
 #include <unordered_map>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/vrml/lexer.h"
 
 namespace hilbrush::vrml {

@@ -1,7 +1,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/vrml/primitives.h"
 #include "sampling/vrml/reading.h"
 #include "sampling/vrml/surfaces.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/levels.h"
 #include "sampling/tone_field.h"
 #include "sim/film/film.h"

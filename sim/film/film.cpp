@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "sim/film/beam.h"
 #include "sim/film/surface_index.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "planner/cell_description.h"
-#include "sampling/progress.h"
+#include "sampling/base/progress.h"
 #include "sampling/textured_mesh.h"
 #include "sim/devices/emission_record.h"
 #include "sim/film/film_lattice.h"

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 namespace {

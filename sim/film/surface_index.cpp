@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 namespace hilbrush {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sim/film/canvas.h"
 #include "sim/film/masked_image.h"
 

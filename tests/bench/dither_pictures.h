@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/input_error.h"
 
 /// Pictures that dithering is tried on: wanted coverage, 0 white to 1 black, in linear light.
 namespace hilbrush::bench {

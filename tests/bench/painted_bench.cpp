@@ -18,7 +18,7 @@
 
 #include "config/cell_file.h"
 #include "config/job_settings.h"
-#include "planner/sha256.h"
+#include "sampling/base/sha256.h"
 #include "sampling/images/image_file.h"
 #include "sampling/levels.h"
 #include "sampling/mesh_repair.h"

@@ -14,7 +14,7 @@
 #include "config/job_settings.h"
 #include "planner/plan.h"
 #include "planner/program_check.h"
-#include "planner/sha256.h"
+#include "sampling/base/sha256.h"
 #include "sampling/images/image_file.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"

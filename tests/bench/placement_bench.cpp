@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "config/job_settings.h"
+#include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/input_error.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"
 #include "sampling/placement.h"

@@ -20,11 +20,11 @@
 
 #include "config/cell_file.h"
 #include "config/job_settings.h"
-#include "planner/angles.h"
 #include "planner/plan.h"
 #include "planner/poses/posed_dots.h"
 #include "planner/program_check.h"
 #include "planner/time_model.h"
+#include "sampling/base/angles.h"
 #include "sampling/images/image_file.h"
 #include "sampling/laminar.h"
 #include "sampling/mesh_repair.h"

@@ -18,8 +18,8 @@
 
 #include "config/cell_file.h"
 #include "planner/reach/reach.h"
+#include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/input_error.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/model_file.h"
 #include "sampling/placement.h"

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 #include "sim/devices/emission_record.h"
 #include "tests/cell/wired_world.h"
 #include "tests/daemon/daemon_process.h"

@@ -9,8 +9,8 @@
 
 #include "config/cell_file.h"
 #include "config/register_map_file.h"
-#include "planner/angles.h"
-#include "sampling/input_error.h"
+#include "sampling/base/angles.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "config/json_reader.h"
-#include "planner/angles.h"
-#include "planner/sha256.h"
+#include "sampling/base/angles.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -9,8 +9,8 @@
 #include <iterator>
 
 #include "config/rpc_errors.h"
-#include "planner/sha256.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
+#include "sampling/base/sha256.h"
 #include "tests/daemon/daemon_fixture.h"
 
 namespace hilbrush {

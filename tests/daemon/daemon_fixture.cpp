@@ -16,7 +16,7 @@
 #include "config/cell_file.h"
 #include "config/job_settings.h"
 #include "planner/program_file.h"
-#include "planner/sha256.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush::test {
 namespace {

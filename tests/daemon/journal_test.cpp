@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 #include "tests/daemon/program_fixture.h"
 
 namespace hilbrush {

@@ -6,9 +6,9 @@
 #include <random>
 #include <string>
 
-#include "planner/angles.h"
 #include "planner/cell_description.h"
 #include "planner/exposure_program.h"
+#include "sampling/base/angles.h"
 #include "tests/support/temporary_folder.h"
 
 /// Cells and programs small enough to reason about: no mesh, no planner; positions follow from nothing but the joints.

@@ -8,8 +8,8 @@
 #include <ctime>
 #include <fstream>
 
+#include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/input_error.h"
 #include "sampling/model_file.h"
 #include "tests/fuzz/campaign.h"
 #include "tests/fuzz/mutator.h"

@@ -3,7 +3,7 @@
 
 #include "config/cell_devices.h"
 #include "config/register_map_file.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 /// libFuzzer: register maps and cell files, which people write.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string>
 
+#include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/input_error.h"
 #include "sampling/model_file.h"
 #include "tests/fuzz/playground.h"
 

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "config/cell_file.h"
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush::testing_pipeline {

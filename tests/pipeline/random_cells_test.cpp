@@ -12,7 +12,7 @@
 #include "planner/check/check_cell.h"
 #include "planner/plan.h"
 #include "planner/program_check.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/mesh_repair.h"
 #include "sampling/sample.h"
 #include "sim/film/film.h"

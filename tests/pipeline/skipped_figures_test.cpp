@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {

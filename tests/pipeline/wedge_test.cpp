@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "config/cell_file.h"
+#include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/input_error.h"
 #include "sampling/model_file.h"
 #include "sampling/tone_field.h"
 

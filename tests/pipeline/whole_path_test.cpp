@@ -6,7 +6,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/pipeline.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "tests/pipeline/painting.h"
 #include "tests/pipeline/report_expectations.h"
 #include "tests/support/shell.h"

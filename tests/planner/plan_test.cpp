@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstring>
 
-#include "planner/angles.h"
 #include "planner/check/check_cell.h"
 #include "planner/dose.h"
 #include "planner/program_check.h"
 #include "planner/reach/reach.h"
 #include "planner/reach/transit.h"
 #include "planner/time_model.h"
-#include "sampling/input_error.h"
+#include "sampling/base/angles.h"
+#include "sampling/base/input_error.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/quality.h"
 #include "tests/support/meshes.h"
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <numbers>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sampling/base/input_error.h"
 #include "sampling/disk/components.h"
-#include "sampling/input_error.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <string>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/model_file.h"
 #include "tests/support/temporary_folder.h"
 

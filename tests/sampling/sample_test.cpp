@@ -7,9 +7,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "sampling/base/input_error.h"
 #include "sampling/curve/patches.h"
 #include "sampling/curve/surface_curve.h"
-#include "sampling/input_error.h"
 #include "sampling/mesh_repair.h"
 #include "tests/support/meshes.h"
 

@@ -3,8 +3,8 @@
 #include <numbers>
 #include <vector>
 
-#include "planner/angles.h"
 #include "planner/cell_description.h"
+#include "sampling/base/angles.h"
 #include "sampling/textured_mesh.h"
 #include "sim/devices/emission_record.h"
 

@@ -8,8 +8,8 @@
 #include <cstring>
 #include <random>
 
-#include "planner/angles.h"
 #include "planner/program_check.h"
+#include "sampling/base/angles.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <vector>
 
-#include "planner/angles.h"
 #include "planner/poses/step_cost.h"
+#include "sampling/base/angles.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "planner/angles.h"
 #include "planner/check/check_cell.h"
+#include "sampling/base/angles.h"
 #include "tests/planner/reach/ray_bundle.h"
 #include "tests/planner/workpieces.h"
 

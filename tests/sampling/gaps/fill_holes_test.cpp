@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
+#include "sampling/base/input_error.h"
 #include "sampling/gaps/dot_grid.h"
 #include "sampling/gaps/dot_path.h"
 #include "sampling/gaps/voronoi_places.h"
-#include "sampling/input_error.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/laminar/contours.h"
 #include "tests/support/meshes.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

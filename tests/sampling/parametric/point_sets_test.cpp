@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 
 namespace hilbrush {
 namespace {

@@ -4,7 +4,7 @@
 #include <complex>
 #include <numbers>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/quality.h"
 #include "sampling/quality/point_transform.h"
 #include "tests/sampling/quality/point_sets.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "sampling/nearest_in_triangle.h"
 #include "sampling/quality.h"
 #include "sampling/sample.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "tests/sim/test_objects.h"
 
 namespace hilbrush {

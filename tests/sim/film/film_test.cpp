@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 #include "sim/film/beam.h"
 #include "tests/sim/test_objects.h"
 

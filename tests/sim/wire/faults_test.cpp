@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "config/fault_script_file.h"
-#include "sampling/input_error.h"
+#include "sampling/base/input_error.h"
 #include "tests/sim/wire/wire_world.h"
 
 namespace hilbrush {

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "planner/angles.h"
+#include "sampling/base/angles.h"
 #include "tests/sim/wire/wire_world.h"
 
 namespace hilbrush {

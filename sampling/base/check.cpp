@@ -1,4 +1,4 @@
-#include "sampling/check.h"
+#include "sampling/base/check.h"
 
 #include <cstdio>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "planner/sha256.h"
+#include "sampling/base/sha256.h"
 
 #include <gtest/gtest.h>
 
