@@ -7,7 +7,7 @@
 #include "planner/plan.h"
 #include "sampling/dots.h"
 #include "sampling/images/image_file.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Pictures of a plan for the people who sign it.
 namespace hilbrush {

@@ -9,7 +9,7 @@
 #include "daemon/skipped_figures.h"
 #include "planner/mounting_advice.h"
 #include "planner/plan.h"
-#include "sampling/mesh_repair.h"
+#include "sampling/model/mesh_repair.h"
 #include "sampling/place_picture.h"
 #include "sim/film/fidelity.h"
 

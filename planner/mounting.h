@@ -1,7 +1,7 @@
 #pragma once
 #include "planner/cell_description.h"
 #include "planner/mounting_options.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// How one job's object is held, applied to cell and mesh.
 namespace hilbrush {

@@ -6,7 +6,7 @@
 
 #include "planner/mounting_options.h"
 #include "planner/plan.h"
-#include "sampling/model_file.h"
+#include "sampling/model/model_file.h"
 
 /// What an operator could change about the mounting so that more dots are reached.
 namespace hilbrush {

@@ -11,7 +11,7 @@
 #include "planner/plan_options.h"
 #include "sampling/base/progress.h"
 #include "sampling/dots.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Dots to program, the entry of planner/:
 ///   pose_search (aims, stations, leftovers with reach's reasons, ordering, yaw) or follow_normal (the baseline) ->

@@ -10,7 +10,7 @@
 #include "sampling/base/check.h"
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/curve/sequence.h"
-#include "sampling/growing_ball.h"
+#include "sampling/model/growing_ball.h"
 #include "sampling/relax/colouring.h"
 #include "sampling/relax/kernel.h"
 #include "sampling/relax/stratum_places.h"

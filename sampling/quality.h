@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sampling/dots.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 #include "sampling/tone_field.h"
 
 /// How good a placement is, in figures: discrepancy, spectrum, spacing, holes, path. After chapter 5 and section 6.2.1

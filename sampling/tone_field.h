@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 #include "sampling/tone.h"
 #include "sampling/tone/asked_atlas.h"
 #include "sampling/tone/triangle_tone.h"

@@ -5,9 +5,9 @@
 #include "sampling/base/input_error.h"
 #include "sampling/curvature.h"
 #include "sampling/images/image_file.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sampling/read_dots.h"
 
 namespace hilbrush {

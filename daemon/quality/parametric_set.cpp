@@ -4,7 +4,7 @@
 #include "config/job_settings.h"
 #include "daemon/quality/measured_set.h"
 #include "sampling/base/input_error.h"
-#include "sampling/mesh_repair.h"
+#include "sampling/model/mesh_repair.h"
 #include "sampling/point_sets.h"
 
 namespace hilbrush {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "planner/cell_description.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// The cell as the program check sees it: forward kinematics as a chain of transforms, the tool as a bundle of rays,
 /// table parts by inside tests. Written apart from kinematics and clearance, which planning uses, so that it does not

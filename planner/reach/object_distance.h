@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Distance to the object's surface on a grid, so that "is this sphere clear?" costs one interpolation.
 /// Exact distances at the nodes, to the spacing of the points that stand for the surface: within error_m() of the truth

@@ -3,7 +3,7 @@
 #include <array>
 #include <memory>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Rays against the object, by Embree. Thread-safe after construction.
 namespace hilbrush {

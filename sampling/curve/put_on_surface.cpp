@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sampling/curve/quad_walk.h"
-#include "sampling/nearest_in_triangle.h"
+#include "sampling/model/nearest_in_triangle.h"
 
 namespace hilbrush {
 namespace {

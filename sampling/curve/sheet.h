@@ -7,7 +7,7 @@
 #include "sampling/curve/hilbert.h"
 #include "sampling/curve/peano.h"
 #include "sampling/curve/piece.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// A sheet is a stretch of the surface that one curve walks: a component on the unit square, or a component in space.
 /// Its base tree is divided until a quad (in space: a cube) holds few triangles and little area; everything finer is

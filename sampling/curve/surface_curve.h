@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sampling/curve/sheet.h"
-#include "sampling/disk/edges.h"
+#include "sampling/model/edges.h"
 #include "sampling/sample.h"
 
 /// What SurfaceCurve keeps of a mesh: sheets with their base trees, and what a dot needs to know of its surroundings.

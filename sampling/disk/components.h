@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "sampling/disk/edges.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/edges.h"
+#include "sampling/model/textured_mesh.h"
 
 /// The connected parts of a mesh, and their shape.
 namespace hilbrush {

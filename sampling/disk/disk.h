@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "sampling/disk/components.h"
-#include "sampling/disk/edges.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/edges.h"
+#include "sampling/model/textured_mesh.h"
 
 /// A component on its way to the square: its triangles as faces that may be split, cut apart and filled up. Every face
 /// knows which part of which mesh triangle it is.

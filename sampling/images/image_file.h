@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Image files through OpenImageIO; the only place that knows it.
 namespace hilbrush {

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// What horizontal planes cut out of a mesh.
 namespace hilbrush {

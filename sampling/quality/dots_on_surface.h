@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "sampling/disk/edges.h"
 #include "sampling/dots.h"
-#include "sampling/growing_ball.h"
+#include "sampling/model/edges.h"
+#include "sampling/model/growing_ball.h"
+#include "sampling/model/textured_mesh.h"
 #include "sampling/quality/point_tree.h"
-#include "sampling/textured_mesh.h"
 
 /// Dots, and how far they are from a place on their surface.
 namespace hilbrush {

@@ -10,7 +10,7 @@
 
 #include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
-#include "sampling/nearest_in_triangle.h"
+#include "sampling/model/nearest_in_triangle.h"
 #include "sampling/quality/dots_on_surface.h"
 #include "sampling/quality/holes.h"
 #include "sampling/quality/spacing.h"

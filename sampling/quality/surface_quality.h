@@ -2,7 +2,7 @@
 #include <atomic>
 #include <memory>
 
-#include "sampling/disk/edges.h"
+#include "sampling/model/edges.h"
 #include "sampling/quality.h"
 #include "sampling/quality/triangle_tree.h"
 

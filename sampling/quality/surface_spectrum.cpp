@@ -9,7 +9,7 @@
 #include <unordered_set>
 
 #include "sampling/base/input_error.h"
-#include "sampling/nearest_in_triangle.h"
+#include "sampling/model/nearest_in_triangle.h"
 #include "sampling/quality/point_tree.h"
 #include "sampling/quality/spectrum.h"
 #include "sampling/quality/surface_quality.h"

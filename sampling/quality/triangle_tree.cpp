@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "sampling/base/check.h"
-#include "sampling/nearest_in_triangle.h"
+#include "sampling/model/nearest_in_triangle.h"
 
 namespace hilbrush {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// A mesh's triangles in a balanced tree of boxes: what of the surface lies in a ball, and which point of it is
 /// nearest.

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// A triangle in its own plane: x runs along its longest edge, y from there to the apex; metres.
 namespace hilbrush {

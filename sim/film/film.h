@@ -6,7 +6,7 @@
 
 #include "planner/cell_description.h"
 #include "sampling/base/progress.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 #include "sim/devices/emission_record.h"
 #include "sim/film/film_lattice.h"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 namespace hilbrush {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 namespace hilbrush {
 

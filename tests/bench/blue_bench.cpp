@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "sampling/images/image_file.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sampling/quality.h"
 #include "sampling/sample.h"
 #include "tests/support/meshes.h"

@@ -10,10 +10,10 @@
 
 #include "sampling/fill_holes.h"
 #include "sampling/laminar.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sampling/parametric.h"
-#include "sampling/placement.h"
 #include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
 #include "tests/bench/process_usage.h"

@@ -10,9 +10,9 @@
 #include "config/cell_file.h"
 #include "sampling/fine.h"
 #include "sampling/images/image_file.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sim/film/fidelity.h"
 #include "tests/bench/process_usage.h"
 

@@ -12,9 +12,9 @@
 
 #include "sampling/disk/cut_to_disk.h"
 #include "sampling/disk/square_map.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sampling/sample.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"

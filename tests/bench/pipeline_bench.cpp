@@ -16,9 +16,9 @@
 #include "planner/program_check.h"
 #include "sampling/base/sha256.h"
 #include "sampling/images/image_file.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sampling/sample.h"
 
 namespace {

@@ -14,10 +14,10 @@
 
 #include "sampling/fill_holes.h"
 #include "sampling/images/image_file.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 #include "sampling/parametric.h"
-#include "sampling/placement.h"
 #include "sampling/plot.h"
 #include "sampling/point_sets.h"
 #include "sampling/quality.h"

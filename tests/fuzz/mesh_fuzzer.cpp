@@ -4,7 +4,7 @@
 
 #include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/model_file.h"
+#include "sampling/model/model_file.h"
 #include "tests/fuzz/playground.h"
 
 /// libFuzzer: the formats that go through OpenMesh; the first byte picks one.

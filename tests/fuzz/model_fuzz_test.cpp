@@ -10,7 +10,7 @@
 
 #include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/model_file.h"
+#include "sampling/model/model_file.h"
 #include "tests/fuzz/campaign.h"
 #include "tests/fuzz/mutator.h"
 #include "tests/fuzz/opened_files.h"

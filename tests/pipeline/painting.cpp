@@ -11,7 +11,7 @@
 #include "daemon/pipeline.h"
 #include "planner/program_file.h"
 #include "sampling/images/image_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/placement.h"
 #include "sim/devices/sim_cell.h"
 #include "tests/support/shell.h"
 #include "tests/support/temporary_folder.h"

@@ -4,7 +4,7 @@
 
 #include "planner/cell_description.h"
 #include "planner/plan_options.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// A cell, an object and settings of planning that nobody thought of, from a seed.
 namespace hilbrush::testing_pipeline {

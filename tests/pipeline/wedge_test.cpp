@@ -9,7 +9,7 @@
 #include "config/cell_file.h"
 #include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
-#include "sampling/model_file.h"
+#include "sampling/model/model_file.h"
 #include "sampling/tone_field.h"
 
 namespace hilbrush {

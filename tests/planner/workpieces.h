@@ -4,7 +4,7 @@
 
 #include "planner/plan.h"
 #include "sampling/dots.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Small workpieces and dots for the tests of planning.
 namespace hilbrush {

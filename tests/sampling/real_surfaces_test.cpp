@@ -5,9 +5,9 @@
 
 #include "sampling/curve/patches.h"
 #include "sampling/curve/surface_curve.h"
-#include "sampling/mesh_repair.h"
-#include "sampling/model_file.h"
-#include "sampling/placement.h"
+#include "sampling/model/mesh_repair.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/placement.h"
 
 namespace hilbrush {
 namespace {

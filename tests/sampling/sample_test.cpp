@@ -10,7 +10,7 @@
 #include "sampling/base/input_error.h"
 #include "sampling/curve/patches.h"
 #include "sampling/curve/surface_curve.h"
-#include "sampling/mesh_repair.h"
+#include "sampling/model/mesh_repair.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -5,7 +5,7 @@
 
 #include "planner/cell_description.h"
 #include "sampling/base/angles.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 #include "sim/devices/emission_record.h"
 
 /// A small cell and simple objects for the tests of sim/, made by hand so that they test nothing else.

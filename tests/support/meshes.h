@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Meshes that tests ask for by name: plain ones, and awkward ones. Metres; about 50 mm large.
 namespace hilbrush::test {

@@ -3,9 +3,9 @@
 #include <utility>
 #include <vector>
 
-#include "sampling/disk/edges.h"
-#include "sampling/renumber.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/edges.h"
+#include "sampling/model/renumber.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Larger meshes from small ones, for benchmarks and tests of size.
 namespace hilbrush::test {

@@ -143,7 +143,7 @@ TEST(Includes, OwnHeadersAreNamedFromTheTopAndExist) {
 
 TEST(Includes, HeavyHeadersStayInSourceFiles) {
   // Shared by the source files of one library, and never included from another folder.
-  const std::set<std::string> kPrivate{"sampling/files/polygon_importer.h"};
+  const std::set<std::string> kPrivate{"sampling/model/files/polygon_importer.h"};
   static const std::regex kHeavy(
       "OpenMesh/.*|OpenImageIO/.*|boost/.*|nlohmann/json\\.hpp|spdlog/.*|CLI/.*|embree3/.*|SQLiteCpp/.*");
   for (const SourceFile& file : source_files()) {
@@ -162,16 +162,16 @@ TEST(Includes, TheTableRefusesWhatItShould) {
     return !is_allowed(*rule_of(path), header, is_ours);
   };
   EXPECT_TRUE(refused("sampling/dots.cpp", "planner/plan.h", true));
-  EXPECT_TRUE(refused("sampling/vrml/parser.cpp", "sampling/sample.h", true));
+  EXPECT_TRUE(refused("sampling/model/vrml/parser.cpp", "sampling/sample.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "sampling/images/image_file.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "OpenImageIO/imageio.h", false));
   EXPECT_TRUE(refused("sampling/base/sha256.cpp", "sampling/dots.h", true));
   EXPECT_TRUE(refused("drivers/laser.h", "planner/cell_description.h", true));
   EXPECT_TRUE(refused("drivers/laser.h", "Eigen/Core", false));
-  EXPECT_TRUE(refused("sim/devices/sim_cell.cpp", "sampling/textured_mesh.h", true));
+  EXPECT_TRUE(refused("sim/devices/sim_cell.cpp", "sampling/model/textured_mesh.h", true));
   EXPECT_TRUE(refused("sim/film/film.cpp", "planner/plan.h", true));
   EXPECT_TRUE(refused("sim/wire/dobot_controller.cpp", "drivers/dobot_codec.h", true));
-  EXPECT_TRUE(refused("config/cell_file.cpp", "sampling/textured_mesh.h", true));
+  EXPECT_TRUE(refused("config/cell_file.cpp", "sampling/model/textured_mesh.h", true));
   EXPECT_TRUE(refused("daemon/server/server.cpp", "sim/film/film.h", true));
   EXPECT_TRUE(refused("daemon/hilbrushd_main.cpp", "planner/plan.h", true));
   EXPECT_TRUE(refused("planner/plan.cpp", "tests/tidy/source_tree.h", true));

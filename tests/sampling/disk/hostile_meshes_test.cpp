@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "sampling/disk/chain.h"
-#include "sampling/mesh_repair.h"
+#include "sampling/model/mesh_repair.h"
 #include "sampling/sample.h"
 
 namespace hilbrush {

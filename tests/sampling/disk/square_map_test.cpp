@@ -6,7 +6,7 @@
 #include <random>
 
 #include "sampling/disk/orientation.h"
-#include "sampling/mesh_repair.h"
+#include "sampling/model/mesh_repair.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "tests/sampling/model_on_disk.h"
+#include "tests/sampling/model/model_on_disk.h"
 
 namespace hilbrush {
 namespace {

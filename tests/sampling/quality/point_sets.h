@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sampling/dots.h"
-#include "sampling/textured_mesh.h"
+#include "sampling/model/textured_mesh.h"
 
 /// Point sets whose figures are known.
 namespace hilbrush::test {

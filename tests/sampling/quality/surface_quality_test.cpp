@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "sampling/base/input_error.h"
-#include "sampling/nearest_in_triangle.h"
+#include "sampling/model/nearest_in_triangle.h"
 #include "sampling/quality.h"
 #include "sampling/sample.h"
 #include "tests/sampling/quality/point_sets.h"

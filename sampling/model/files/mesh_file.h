@@ -1,0 +1,31 @@
+#pragma once
+#include <string>
+
+#include "sampling/model/model_file.h"
+#include "sampling/model/model_folder.h"
+
+/// The mesh formats that OpenMesh reads. Its readers fill a list of polygons here, not one of its meshes, so that faces
+/// which do not fit together as a manifold arrive as they are and mesh_repair reports what it does about them. What its
+/// readers do not bear (files that name other files, counts that lie, endless lists) is checked or rewritten before
+/// they see the bytes.
+namespace hilbrush {
+
+/// OBJ with its MTL: one texture or colour a material, colours a vertex. `text` is the whole file, `name` what messages
+/// call it.
+/// @throws InputError "name:line" or "name" if nothing usable is in it or a limit is exceeded; so do the others.
+Model load_obj(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
+               const ModelLimits& limits);
+
+/// PLY, ASCII and binary: texture coordinates a vertex (u v, s t, texture_u texture_v) or a face corner (a list named
+/// texcoord), the image of "comment TextureFile", colours a vertex or a face.
+Model load_ply(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
+               const ModelLimits& limits);
+
+/// OFF, ASCII: colours a vertex or a face.
+Model load_off(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
+               const ModelLimits& limits);
+
+/// STL, ASCII and binary.
+Model load_stl(std::string text, const std::string& name, const ModelLimits& limits);
+
+}  // namespace hilbrush

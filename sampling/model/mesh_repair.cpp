@@ -1,0 +1,391 @@
+#include "sampling/model/mesh_repair.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "sampling/base/input_error.h"
+#include "sampling/model/edges.h"
+#include "sampling/model/renumber.h"
+
+namespace hilbrush {
+namespace {
+
+/// A triangle whose height is below this share of its longest side has no area that arithmetic could use.
+constexpr double kFlattest = 1e-10;
+
+/// Keeps the triangles for which `keep` is true, with everything that belongs to them. Returns how many were dropped.
+template <class Keep>
+std::size_t keep_triangles(TexturedMesh& mesh, Keep keep) {
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (!keep(t)) continue;
+    mesh.triangles[kept] = mesh.triangles[t];
+    mesh.corner_uv[kept] = mesh.corner_uv[t];
+    mesh.corner_luminance[kept] = mesh.corner_luminance[t];
+    mesh.material_index[kept] = mesh.material_index[t];
+    ++kept;
+  }
+  const std::size_t dropped = mesh.triangles.size() - kept;
+  mesh.triangles.resize(kept);
+  mesh.corner_uv.resize(kept);
+  mesh.corner_luminance.resize(kept);
+  mesh.material_index.resize(kept);
+  return dropped;
+}
+
+void turn_over(TexturedMesh& mesh, std::size_t t) {
+  std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
+  std::swap(mesh.corner_uv[t][1], mesh.corner_uv[t][2]);
+  std::swap(mesh.corner_luminance[t][1], mesh.corner_luminance[t][2]);
+}
+
+bool has_usable_corners(const TexturedMesh& mesh, std::size_t t) {
+  return std::ranges::all_of(mesh.triangles[t],
+                             [&](std::uint32_t v) { return v < mesh.vertices.size() && mesh.vertices[v].allFinite(); });
+}
+
+/// The corner where the shortest side of a triangle begins, if that side is a point next to the longest one.
+std::optional<int> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
+  std::array<double, 3> length2{};
+  for (int k = 0; k < 3; ++k)
+    length2[static_cast<std::size_t>(k)] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
+  const auto shortest = std::min_element(length2.begin(), length2.end());
+  const double longest2 = *std::max_element(length2.begin(), length2.end());
+  if (!(*shortest > 0) || *shortest > kFlattest * kFlattest * longest2) return std::nullopt;
+  return static_cast<int>(shortest - length2.begin());
+}
+
+/// Gives the ends of collapsed sides one position, so that what hung together over such a triangle still does: poles
+/// whose vertices differ by rounding. Returns whether there were any.
+bool close_collapsed_sides(TexturedMesh& mesh) {
+  std::vector<std::uint32_t> parent(mesh.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto find = [&](std::uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  bool is_any = false;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (const auto k = collapsed_side(mesh, t)) {
+      const auto i = static_cast<std::size_t>(*k);
+      const std::uint32_t a = find(mesh.triangles[t][i]), b = find(mesh.triangles[t][(i + 1) % 3]);
+      parent[std::max(a, b)] = std::min(a, b);
+      is_any = true;
+    }
+  if (is_any)
+    for (std::uint32_t v = 0; v < parent.size(); ++v) mesh.vertices[v] = Eigen::Vector3d(mesh.vertices[find(v)]);
+  return is_any;
+}
+
+bool has_area(const TexturedMesh& mesh, std::size_t t) {
+  const auto& [a, b, c] = mesh.triangles[t];
+  if (a == b || b == c || c == a) return false;
+  double longest2 = 0;
+  for (int k = 0; k < 3; ++k)
+    longest2 = std::max(longest2, (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm());
+  return 2 * mesh.area_vector(t).norm() > kFlattest * longest2;
+}
+
+/// Gives equal positions one vertex, and drops the vertices that no triangle uses. Returns how many became one with
+/// another.
+std::size_t weld_vertices(TexturedMesh& mesh) {
+  std::vector<char> is_used(mesh.vertices.size(), 0);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const auto v : triangle) is_used[v] = 1;
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+    mesh.vertices[v] += Eigen::Vector3d::Zero();  // -0 becomes +0
+    if (is_used[v]) order.push_back(v);
+  }
+  const auto key = [&](std::uint32_t v) {
+    const Eigen::Vector3d& p = mesh.vertices[v];
+    return std::array{p.x(), p.y(), p.z()};
+  };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const auto ka = key(a), kb = key(b);
+    return ka != kb ? ka < kb : a < b;
+  });
+  std::vector<std::uint32_t> first_equal(mesh.vertices.size());
+  std::size_t welded = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool is_equal = i > 0 && key(order[i]) == key(order[i - 1]);
+    first_equal[order[i]] = is_equal ? first_equal[order[i - 1]] : order[i];
+    welded += is_equal;
+  }
+  // Vertices keep the order of the file.
+  std::vector<std::uint32_t> new_index(mesh.vertices.size());
+  std::vector<Eigen::Vector3d> kept;
+  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (!is_used[v]) continue;
+    if (first_equal[v] == v) {
+      new_index[v] = static_cast<std::uint32_t>(kept.size());
+      kept.push_back(mesh.vertices[v]);
+    }
+    new_index[v] = new_index[first_equal[v]];
+  }
+  for (Triangle& triangle : mesh.triangles)
+    for (auto& v : triangle) v = new_index[v];
+  mesh.vertices = std::move(kept);
+  return welded;
+}
+
+std::size_t drop_duplicates(TexturedMesh& mesh) {
+  std::vector<std::pair<Triangle, std::uint32_t>> sorted;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    Triangle key = mesh.triangles[t];
+    std::sort(key.begin(), key.end());
+    sorted.emplace_back(key, t);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<char> is_duplicate(mesh.triangles.size(), 0);
+  for (std::size_t i = 1; i < sorted.size(); ++i)
+    is_duplicate[sorted[i].second] = sorted[i].first == sorted[i - 1].first;
+  return keep_triangles(mesh, [&](std::size_t t) { return !is_duplicate[t]; });
+}
+
+/// Two triangles run alike if they pass their common edge in opposite directions.
+bool run_alike(const std::vector<Triangle>& triangles, TriangleSide a, TriangleSide b) {
+  return triangles[a.triangle][a.side] != triangles[b.triangle][b.side];
+}
+
+/// Parts of the surface that hang together over edges of two triangles: turned so that neighbours run alike, as most of
+/// each part already did. Edges where that is impossible (a Moebius strip has one) are cut.
+class Orientation {
+ public:
+  Orientation(TexturedMesh& mesh, const EdgeTable& edges) : mesh_(mesh), partners_(mesh.triangle_count()) {
+    for (auto& sides : partners_) sides.fill(kNoSide);
+    for (const EdgeGroup& group : edges.groups)
+      if (group.end - group.begin == 2) join(edges.sides[group.begin], edges.sides[group.begin + 1]);
+  }
+
+  /// Returns how many triangles it turned over.
+  std::size_t orient() {
+    std::size_t turned = 0;
+    std::vector<char> state(mesh_.triangle_count(), kUnseen);
+    for (std::uint32_t seed = 0; seed < state.size(); ++seed) {
+      if (state[seed] != kUnseen) continue;
+      std::vector<std::uint32_t> part = collect_part(seed, state);
+      const auto turn_count = std::ranges::count_if(part, [&](std::uint32_t t) { return state[t] == kTurn; });
+      const char turned_state = 2 * static_cast<std::size_t>(turn_count) > part.size() ? kKeep : kTurn;
+      for (const auto t : part)
+        if (state[t] == turned_state) {
+          to_turn_.push_back(t);
+          ++turned;
+        }
+    }
+    cut_conflicts(state);
+    for (const auto t : to_turn_) turn_with_partners(t);
+    return turned;
+  }
+
+  std::size_t cut_count() const { return cut_count_; }
+  /// Who is joined to whom, by side, after everything.
+  Neighbours& partners() { return partners_; }
+  void turn_with_partners(std::uint32_t t) {
+    turn_over(mesh_, t);  // sides 0, 1, 2 become 2, 1, 0
+    std::swap(partners_[t][0], partners_[t][2]);
+    for (std::uint8_t s = 0; s < 3; ++s) {
+      const TriangleSide other = partners_[t][s];
+      if (other != kNoSide) partners_[other.triangle][other.side] = {t, s};
+    }
+  }
+  void join(TriangleSide a, TriangleSide b) {
+    if (a.triangle == b.triangle) return;
+    partners_[a.triangle][a.side] = b;
+    partners_[b.triangle][b.side] = a;
+  }
+
+ private:
+  static constexpr char kUnseen = 0, kKeep = 1, kTurn = 2;
+
+  std::vector<std::uint32_t> collect_part(std::uint32_t seed, std::vector<char>& state) const {
+    std::vector<std::uint32_t> part{seed};
+    state[seed] = kKeep;
+    for (std::size_t i = 0; i < part.size(); ++i)
+      for (std::uint8_t s = 0; s < 3; ++s) {
+        const TriangleSide other = partners_[part[i]][s];
+        if (other == kNoSide || state[other.triangle] != kUnseen) continue;
+        const bool is_alike = run_alike(mesh_.triangles, {part[i], s}, other);
+        state[other.triangle] = is_alike == (state[part[i]] == kKeep) ? kKeep : kTurn;
+        part.push_back(other.triangle);
+      }
+    return part;
+  }
+
+  void cut_conflicts(const std::vector<char>& state) {
+    for (std::uint32_t t = 0; t < partners_.size(); ++t)
+      for (std::uint8_t s = 0; s < 3; ++s) {
+        const TriangleSide other = partners_[t][s];
+        if (other == kNoSide) continue;
+        const bool is_alike = run_alike(mesh_.triangles, {t, s}, other);
+        if (is_alike == (state[t] == state[other.triangle])) continue;
+        partners_[t][s] = partners_[other.triangle][other.side] = kNoSide;
+        ++cut_count_;
+      }
+  }
+
+  TexturedMesh& mesh_;
+  Neighbours partners_;
+  std::vector<std::uint32_t> to_turn_;
+  std::size_t cut_count_ = 0;
+};
+
+/// The sides on one edge with more than two triangles, by their angle around it. A triangle that runs along the edge
+/// has what is outside on its counter-clockwise hand, so it closes a solid with the next one clockwise that runs
+/// against.
+struct SideAround {
+  TriangleSide side;
+  double angle = 0;
+  bool runs_along = false;
+};
+
+std::vector<SideAround> sort_around(const TexturedMesh& mesh, const EdgeTable& edges, const EdgeGroup& group) {
+  const Eigen::Vector3d origin = mesh.vertices[group.from];
+  const Eigen::Vector3d axis = (mesh.vertices[group.to] - origin).normalized();
+  Eigen::Vector3d x = axis.unitOrthogonal();
+  const Eigen::Vector3d y = axis.cross(x);
+  std::vector<SideAround> around;
+  for (std::uint32_t i = group.begin; i < group.end; ++i) {
+    const TriangleSide s = edges.sides[i];
+    const Eigen::Vector3d apex = mesh.corner(s.triangle, (s.side + 2) % 3) - origin;
+    around.push_back({s, std::atan2(apex.dot(y), apex.dot(x)), mesh.triangles[s.triangle][s.side] == group.from});
+  }
+  std::stable_sort(around.begin(), around.end(),
+                   [](const SideAround& a, const SideAround& b) { return a.angle < b.angle; });
+  return around;
+}
+
+/// Joins the triangles on edges with more than two of them in pairs that enclose a solid; returns how many such edges
+/// there are.
+std::size_t pair_up_crowded_edges(const TexturedMesh& mesh, const EdgeTable& edges, Orientation& orientation) {
+  std::size_t crowded = 0;
+  for (const EdgeGroup& group : edges.groups) {
+    if (group.end - group.begin <= 2) continue;
+    ++crowded;
+    const auto around = sort_around(mesh, edges, group);
+    const std::size_t n = around.size();
+    std::vector<char> is_joined(n, 0);
+    // A side that runs along `axis` has its apex to the left, seen with the axis up, and its outside towards growing
+    // angle ...
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t next = (i + 1) % n;
+      // ... so that between one that runs against and a following one that runs along lies the solid they enclose.
+      if (is_joined[i] || is_joined[next] || around[i].runs_along || !around[next].runs_along) continue;
+      orientation.join(around[i].side, around[next].side);
+      is_joined[i] = is_joined[next] = 1;
+    }
+  }
+  return crowded;
+}
+
+/// Closed parts with a negative volume are inside out.
+std::size_t turn_closed_parts_outwards(const TexturedMesh& mesh, Orientation& orientation) {
+  std::size_t turned = 0;
+  std::vector<char> is_seen(mesh.triangle_count(), 0);
+  for (std::uint32_t seed = 0; seed < is_seen.size(); ++seed) {
+    if (is_seen[seed]) continue;
+    is_seen[seed] = 1;
+    std::vector<std::uint32_t> part{seed};
+    bool is_closed = true;
+    double volume = 0;
+    const Eigen::Vector3d& origin = mesh.corner(seed, 0);
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      volume += mesh.area_vector(part[i]).dot(mesh.corner(part[i], 0) - origin);
+      for (const TriangleSide other : orientation.partners()[part[i]]) {
+        if (other == kNoSide) {
+          is_closed = false;
+        } else if (!is_seen[other.triangle]) {
+          is_seen[other.triangle] = 1;
+          part.push_back(other.triangle);
+        }
+      }
+    }
+    if (!is_closed || volume >= 0) continue;
+    for (const auto t : part) orientation.turn_with_partners(t);
+    turned += part.size();
+  }
+  return turned;
+}
+
+/// Gives every fan of triangles that hang together around a vertex a vertex of its own. Returns how many were added.
+std::size_t split_vertices(TexturedMesh& mesh, const Neighbours& partners) {
+  std::vector<std::uint32_t> parent(3 * mesh.triangle_count());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto find = [&](std::uint32_t c) {
+    while (parent[c] != c) c = parent[c] = parent[parent[c]];
+    return c;
+  };
+  const auto unite = [&](std::uint32_t a, std::uint32_t b) {
+    a = find(a), b = find(b);
+    parent[std::max(a, b)] = std::min(a, b);
+  };
+  for (std::uint32_t t = 0; t < partners.size(); ++t)
+    for (std::uint32_t s = 0; s < 3; ++s) {
+      const TriangleSide other = partners[t][s];
+      if (other == kNoSide || other.triangle < t) continue;
+      const std::uint32_t o = 3 * other.triangle;
+      unite(3 * t + s, o + (other.side + 1u) % 3);
+      unite(3 * t + (s + 1) % 3, o + other.side);
+    }
+  std::vector<char> is_taken(mesh.vertices.size(), 0);
+  std::vector<std::uint32_t> vertex_of_root(parent.size());
+  std::size_t added = 0;
+  for (std::uint32_t c = 0; c < parent.size(); ++c) {
+    std::uint32_t& v = mesh.triangles[c / 3][c % 3];
+    const std::uint32_t root = find(c);
+    if (root == c) {
+      vertex_of_root[c] = v;
+      if (is_taken[v]) {
+        vertex_of_root[c] = static_cast<std::uint32_t>(mesh.vertices.size());
+        mesh.vertices.push_back(Eigen::Vector3d(mesh.vertices[v]));
+        ++added;
+      } else {
+        is_taken[v] = 1;
+      }
+    }
+    v = vertex_of_root[root];
+  }
+  return added;
+}
+
+}  // namespace
+
+RepairedMesh repair_mesh(TexturedMesh mesh) {
+  RepairedMesh result;
+  const auto count = [&](const char* what, std::size_t n) {
+    if (n > 0) result.repairs.push_back({what, n});
+  };
+  count("triangles without usable corners dropped",
+        keep_triangles(mesh, [&](std::size_t t) { return has_usable_corners(mesh, t); }));
+  std::size_t welded = weld_vertices(mesh);
+  if (close_collapsed_sides(mesh)) welded += weld_vertices(mesh);
+  count("vertices welded", welded);
+  count("degenerate triangles dropped", keep_triangles(mesh, [&](std::size_t t) { return has_area(mesh, t); }));
+  count("duplicate triangles dropped", drop_duplicates(mesh));
+  if (mesh.triangles.empty()) throw InputError("", "the model has no triangle with an area");
+  weld_vertices(mesh);  // vertices of dropped triangles go
+
+  const EdgeTable edges = edge_table(mesh.triangles);
+  Orientation orientation(mesh, edges);
+  std::size_t turned = orientation.orient();
+  count("edges cut where the surface has one side only", orientation.cut_count());
+  // Turning moved sides about, so the edges are looked up again.
+  const std::size_t crowded = pair_up_crowded_edges(mesh, edge_table(mesh.triangles), orientation);
+  turned += turn_closed_parts_outwards(mesh, orientation);
+  count("triangles turned over", turned);
+  count("edges split where more than two triangles meet", crowded);
+  std::size_t split = split_vertices(mesh, orientation.partners());
+  // A cut may end inside the surface, where both its sides still have the same vertices: from here on the triangles
+  // alone say what hangs together.
+  for (std::size_t added = split; added > 0; split += added)
+    added = split_vertices(mesh, find_neighbours(mesh.triangles));
+  count("vertices split where parts only touch", split);
+  renumber_along_surface(mesh);
+  result.mesh = std::move(mesh);
+  return result;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,65 @@
+#include "sampling/model/placement.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "sampling/base/input_error.h"
+
+namespace hilbrush {
+namespace {
+
+constexpr double kLargestSideM = 2;
+
+std::string millimetres(double length_m) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g mm", length_m * 1e3);
+  return text;
+}
+
+/// Metres of one unit of the file.
+double scale_of(const Model& model, const PlacementOptions& options, double longest_side) {
+  if (options.size_m) {
+    if (!std::isfinite(*options.size_m) || *options.size_m <= 0)
+      throw InputError("", "the size must be more than 0 mm");
+    const double scale = *options.size_m / longest_side;
+    // Saying both is fine as long as they agree.
+    if (options.unit_m && std::abs(*options.unit_m / scale - 1) > 1e-6)
+      throw InputError("", "--size-mm and --units-mm contradict each other: in units of " +
+                               millimetres(*options.unit_m) + " the longest side is " +
+                               millimetres(*options.unit_m * longest_side) + ", not " + millimetres(*options.size_m) +
+                               "; give one of them");
+    return scale;
+  }
+  const std::optional<double> unit_m = options.unit_m ? options.unit_m : model.unit_m;
+  if (!unit_m)
+    throw InputError("",
+                     "the model's file does not say how large the object is: give --size-mm (its longest side) or "
+                     "--units-mm (one unit of the file)");
+  if (!std::isfinite(*unit_m) || *unit_m <= 0) throw InputError("", "the unit must be more than 0 mm");
+  return *unit_m;
+}
+
+}  // namespace
+
+TexturedMesh place_on_table(const Model& model, const PlacementOptions& options) {
+  TexturedMesh mesh = model.mesh;
+  if (mesh.triangles.empty()) throw InputError("", "the model has no triangles");
+  if (options.up.value_or(model.up) == UpAxis::kY)
+    for (Eigen::Vector3d& p : mesh.vertices) p = {p.x(), -p.z(), p.y()};
+
+  const auto [low, high] = bounds(mesh);
+  const double longest_side = (high - low).maxCoeff();
+  if (!std::isfinite(longest_side) || longest_side <= 0) throw InputError("", "the model has no extent");
+  const double scale = scale_of(model, options, longest_side);
+  const double size_m = scale * longest_side;
+  if (!std::isfinite(size_m) || size_m > kLargestSideM)
+    throw InputError("", "the object would be " + millimetres(size_m) + " long, more than " +
+                             millimetres(kLargestSideM) +
+                             "; give --size-mm (its longest side) or --units-mm (one unit of the file)");
+  if (size_m < 1e-6) throw InputError("", "the object would be only " + millimetres(size_m) + " long");
+  const Eigen::Vector3d foot((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, low.z());
+  for (Eigen::Vector3d& p : mesh.vertices) p = scale * (p - foot);
+  return mesh;
+}
+
+}  // namespace hilbrush

@@ -1,0 +1,238 @@
+#include "sampling/model/vrml/reading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "sampling/base/input_error.h"
+
+namespace hilbrush::vrml {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kWarningLimit = 200;
+constexpr std::size_t kUrlLimit = 16;         // tried of one list
+constexpr std::size_t kLookupLimit = 20'000;  // file look-ups of one model
+constexpr std::size_t kWorkPerTriangle = 16;
+
+/// Geometry where a Shape must stand around it.
+bool is_bare_geometry(const std::string& type) {
+  static const std::set<std::string> types{"Box",           "Sphere",   "Cylinder", "Cone", "IndexedFaceSet",
+                                           "ElevationGrid", "Extrusion"};
+  return types.count(type) > 0;
+}
+
+/// Nodes that belong to a scene but never to a surface; nobody misses them.
+bool is_scenery(const std::string& type) {
+  static const std::set<std::string> types{
+      "Viewpoint", "NavigationInfo", "Background", "Fog", "Sound", "AudioClip", "MovieTexture", "WorldInfo", "Script",
+      "DirectionalLight", "PointLight", "SpotLight", "TimeSensor", "TouchSensor", "PlaneSensor", "SphereSensor",
+      "CylinderSensor", "ProximitySensor", "VisibilitySensor", "ColorInterpolator", "CoordinateInterpolator",
+      "NormalInterpolator", "OrientationInterpolator", "PositionInterpolator", "ScalarInterpolator",
+      // VRML 1.0
+      "Info", "FontStyle", "Normal", "NormalBinding", "OrthographicCamera", "PerspectiveCamera"};
+  return types.count(type) > 0;
+}
+
+std::string quoted_list(const std::vector<std::string>& names) {
+  std::string out;
+  for (std::size_t i = 0; i < std::min(names.size(), kUrlLimit); ++i) {
+    out += (i ? ", '" : "'");
+    for (const char c : names[i].substr(0, 120)) out += c >= ' ' && c < 127 ? c : '?';
+    out += "'";
+  }
+  return out;
+}
+
+}  // namespace
+
+fs::path Reading::folder_of(const Node& node) const {
+  return folder_.path() / fs::path(*node.file).parent_path();
+}
+
+void Reading::warn(const Node& node, const std::string& sentence) {
+  warn(std::vector<std::string>{at(node) + ": " + sentence});
+}
+
+void Reading::warn(const std::vector<std::string>& sentences) {
+  for (const std::string& sentence : sentences)
+    if (warnings.size() < kWarningLimit && std::find(warnings.begin(), warnings.end(), sentence) == warnings.end())
+      warnings.push_back(sentence);
+}
+
+const Scene& Reading::parse_text(const std::string& text, const std::string& name) {
+  auto& scene = scenes_["\n" + name];  // no inline's path begins so
+  scene = std::make_unique<Scene>(parse(text, name, limits_, parse_budget_, warnings));
+  return *scene;
+}
+
+const Scene* Reading::open_inline(const Node& node, const std::vector<std::string>& urls) {
+  const auto [known, is_new] = inline_lists_.try_emplace({folder_of(node).string(), urls}, nullptr);
+  if (!is_new) return known->second;
+  std::string reason = "it names no file";
+  for (std::size_t i = 0; i < std::min(urls.size(), kUrlLimit) && lookup_count_ < kLookupLimit; ++i) {
+    ++lookup_count_;
+    // Links into a file are not followed: "arm.wrl#Viewpoint" is arm.wrl.
+    const auto file = folder_.find(folder_of(node), urls[i].substr(0, urls[i].find('#')), reason);
+    if (!file) continue;
+    const auto [found, is_first] = scenes_.try_emplace(file->string());
+    if (is_first) {
+      const std::string text = folder_.read(*file);
+      found->second = std::make_unique<Scene>(parse(text, folder_.name(*file), limits_, parse_budget_, warnings));
+    }
+    return known->second = found->second.get();
+  }
+  ++missing_inline_count_;
+  warn(node, "the inlined file can't be read (" + reason + "); tried " + quoted_list(urls));
+  return nullptr;
+}
+
+int Reading::open_image(const Node& node, const std::vector<std::string>& urls) {
+  const auto [known, is_new] = image_lists_.try_emplace({folder_of(node).string(), urls}, -1);
+  if (!is_new) return known->second;
+  std::string reason = "it names no file";
+  for (std::size_t i = 0; i < std::min(urls.size(), kUrlLimit) && lookup_count_ < kLookupLimit; ++i) {
+    ++lookup_count_;
+    const auto file = folder_.find(folder_of(node), urls[i], reason);
+    if (!file) continue;
+    const auto [found, is_first] = images_.try_emplace(file->string(), -1);
+    if (is_first) {
+      if (auto texture = read_image_(*file, limits_.image_pixels - pixel_count_, reason)) {
+        pixel_count_ += texture->luminance.size();
+        texture->name = folder_.name(*file);
+        found->second = builder.add_texture(std::move(*texture));
+        folder_.note(*file);
+      }
+    }
+    if (found->second >= 0) return known->second = found->second;
+  }
+  warn(node, "the texture can't be read (" + reason + "); tried " + quoted_list(urls));
+  return -1;
+}
+
+int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
+  const auto [known, is_new] = pixel_textures_.try_emplace(image.data(), -1);
+  if (!is_new) return known->second;
+  if (image.size() < 3 || image[0] < 1 || image[1] < 1) return -1;  // 0 0 0 is no texture
+  const double count = std::floor(image[0]) * std::floor(image[1]);
+  if (image[2] < 1 || image[2] > 4 || count > static_cast<double>(image.size() - 3) ||
+      count > static_cast<double>(limits_.image_pixels - pixel_count_)) {
+    warn(node, "the texture of pixels can't be read: it must have width, height, 1 to 4 channels, and as many pixels");
+    return -1;
+  }
+  Texture texture;
+  texture.width = static_cast<int>(image[0]);
+  texture.height = static_cast<int>(image[1]);
+  texture.channels = static_cast<int>(image[2]);
+  texture.name = at(node);
+  for (std::size_t i = 3; i < 3 + static_cast<std::size_t>(count); ++i) {
+    const double value = std::clamp(image[i], 0., 4294967295.);
+    const auto pixel = static_cast<std::uint32_t>(value);
+    const auto channel = [&](int c) { return ((pixel >> (8 * (texture.channels - 1 - c))) & 255u) / 255.; };
+    const bool is_grey = texture.channels < 3;
+    texture.luminance.push_back(luminance_of_srgb(channel(0), channel(is_grey ? 0 : 1), channel(is_grey ? 0 : 2)));
+    if (texture.channels % 2 == 0) texture.opacity.push_back(static_cast<float>(channel(texture.channels - 1)));
+  }
+  pixel_count_ += texture.luminance.size();
+  return known->second = builder.add_texture(std::move(texture));
+}
+
+Reference Reading::resolve(Reference reference) {
+  while (reference) {
+    const Node& node = *reference.node;
+    if (++node_count_ > limits_.nodes)
+      throw InputError(at(node), "with USE, PROTO and Inline expanded the model has more nodes than the limit of " +
+                                     std::to_string(limits_.nodes));
+    if (!node.prototype) return reference;
+    if (!node.prototype->body) {
+      ignore(node);
+      return {};
+    }
+    frames_.push_back({&node, reference.frame});
+    reference = {node.prototype->body.get(), &frames_.back()};
+  }
+  return reference;
+}
+
+void Reading::spend(std::size_t numbers, const Node& node) {
+  work_ += numbers;
+  if (work_ > kWorkPerTriangle * limits_.triangles)
+    throw InputError(at(node), "with USE, PROTO and Inline expanded the model has more geometry than the limit allows");
+}
+
+void Reading::ignore(const Node& node) {
+  if (is_scenery(node.type)) return;
+  // A hostile file may make up any number of types; the first few say enough.
+  if (ignored_.size() > kWarningLimit && !ignored_.count(node.type)) return;
+  Ignored& entry = ignored_[node.type];
+  if (entry.count++ == 0) entry.first_at = at(node);
+}
+
+std::string Reading::no_surface_sentence() const {
+  std::string sentence = "there is no surface to paint";
+  std::string types;
+  for (const auto& [type, entry] : ignored_)
+    types += (types.empty() ? "" : ", ") + std::to_string(entry.count) + " " + type.substr(0, 60) +
+             (is_bare_geometry(type) ? " (without a Shape around it)" : "");
+  if (missing_inline_count_ > 0)
+    sentence += "; " + std::to_string(missing_inline_count_) + " inlined files are missing";
+  if (!types.empty()) sentence += "; nodes that make no surface or are not known: " + types;
+  return sentence;
+}
+
+TexturedMesh Reading::finish(const std::string& name) {
+  if (builder.mesh().triangles.empty()) throw InputError(name, no_surface_sentence());
+  for (const auto& [type, entry] : ignored_)
+    if (warnings.size() < kWarningLimit)
+      warnings.push_back(entry.first_at + ": " + type.substr(0, 80) + " is left out (" + std::to_string(entry.count) +
+                         (entry.count == 1 ? " node)" : " nodes)"));
+  return builder.finish(warnings);
+}
+
+void walk(Reading& reading, const Scene& scene, const Place& place) {
+  if (scene.version == 1)
+    walk_vrml1(reading, scene, place);
+  else
+    walk_vrml2(reading, scene, place);
+}
+
+Place deeper(const Reading& reading, const Place& place, const Node& node) {
+  if (place.depth >= reading.limits().depth)
+    throw InputError(at(node), "with PROTO and Inline expanded, nodes are nested more than " +
+                                   std::to_string(reading.limits().depth) + " deep");
+  Place inner = place;
+  ++inner.depth;
+  return inner;
+}
+
+void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Place& place) {
+  const Scene* scene = reading.open_inline(node, urls);
+  if (!scene) return;
+  if (std::find(place.files.begin(), place.files.end(), scene) != place.files.end()) {
+    reading.warn(node, "the inlined file contains itself; this one is left out");
+    return;
+  }
+  Place inside = deeper(reading, place, node);
+  inside.files.push_back(scene);
+  walk(reading, *scene, inside);
+}
+
+Eigen::Affine3d transform_of(const Reference& node, const char* scale_field) {
+  using Eigen::Matrix3d;
+  using Eigen::Translation3d;
+  using Eigen::Vector3d;
+  using Eigen::Vector4d;
+  const Vector3d center = vector3_of(node, "center", Vector3d::Zero());
+  const Vector3d scale = vector3_of(node, scale_field, Vector3d::Ones());
+  const Vector3d translation = vector3_of(node, "translation", Vector3d::Zero());
+  const Matrix3d rotation = rotation_matrix(rotation_of(node, "rotation", Vector4d(0, 0, 1, 0)));
+  const Matrix3d oriented = rotation_matrix(rotation_of(node, "scaleOrientation", Vector4d(0, 0, 1, 0)));
+  const Matrix3d linear = rotation * oriented * scale.asDiagonal() * oriented.transpose();
+  Eigen::Affine3d X;
+  X.linear() = linear;
+  X.translation() = translation + center - linear * center;
+  return X;
+}
+
+}  // namespace hilbrush::vrml

@@ -1,0 +1,106 @@
+#pragma once
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sampling/model/files/face_list.h"
+#include "sampling/model/model_file.h"
+#include "sampling/model/model_folder.h"
+#include "sampling/model/vrml/binding.h"
+#include "sampling/model/vrml/parser.h"
+
+namespace hilbrush::vrml {
+
+/// What one model's reading has in hand while the walks over its files' trees make the mesh: limits, files, images, the
+/// mesh so far.
+class Reading {
+ public:
+  Reading(ModelFolder& folder, const ImageReader& read_image, const ModelLimits& limits)
+      : builder(limits), limits_(limits), folder_(folder), read_image_(read_image) {}
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
+
+  /// Parses text that is at hand (the model itself). The result lives as long as this.
+  const Scene& parse_text(const std::string& text, const std::string& name);
+
+  /// The first of an Inline's urls that can be read, or null with a warning that names them.
+  const Scene* open_inline(const Node& node, const std::vector<std::string>& urls);
+
+  /// Index of the first of the urls that can be read, or -1 with a warning that names them.
+  int open_image(const Node& node, const std::vector<std::string>& urls);
+
+  /// Index of the texture that an SFImage makes (width, height, channels, pixels from the lower left), or -1 with a
+  /// warning.
+  int pixel_texture(const Node& node, const std::vector<double>& image);
+
+  /// Follows a PROTO instance to the node it stands for, to be walked; null if it has none. Every call counts as a
+  /// node.
+  /// @throws InputError if the limit of nodes is exceeded.
+  Reference resolve(Reference reference);
+
+  /// Counts the numbers that a node's geometry is made from, so that many USEs of a large one end. @throws InputError.
+  void spend(std::size_t numbers, const Node& node);
+
+  /// Notes a node that makes no surface; the first place of each type is reported.
+  void ignore(const Node& node);
+
+  void warn(const Node& node, const std::string& sentence);
+  /// Adds warnings that say where they are from themselves; each is said once.
+  void warn(const std::vector<std::string>& sentences);
+
+  /// Ends the reading: notes on what was ignored, then all warnings. @throws InputError at `name` if no surface was
+  /// found.
+  TexturedMesh finish(const std::string& name);
+
+  const ModelLimits& limits() const { return limits_; }
+
+  MeshBuilder builder;
+  std::vector<std::string> warnings;
+
+ private:
+  std::filesystem::path folder_of(const Node& node) const;
+  std::string no_surface_sentence() const;
+
+  struct Ignored {
+    std::size_t count = 0;
+    std::string first_at;
+  };
+
+  const ModelLimits& limits_;
+  ModelFolder& folder_;
+  const ImageReader& read_image_;
+  ParseBudget parse_budget_;
+  std::size_t node_count_ = 0, work_ = 0, pixel_count_ = 0, missing_inline_count_ = 0, lookup_count_ = 0;
+  std::deque<Frame> frames_;
+  std::map<std::string, std::unique_ptr<Scene>> scenes_;                         // by file; null: can't be read
+  std::map<std::string, int> images_;                                            // by file; -1: can't be read
+  std::map<std::pair<std::string, std::vector<std::string>>, int> image_lists_;  // by folder and urls
+  std::map<std::pair<std::string, std::vector<std::string>>, const Scene*> inline_lists_;
+  std::map<const double*, int> pixel_textures_;
+  std::map<std::string, Ignored> ignored_;
+};
+
+/// Where a shape stands and how deep the walk is.
+struct Place {
+  Eigen::Affine3d X = Eigen::Affine3d::Identity();
+  int depth = 0;
+  std::vector<const Scene*> files;  ///< being walked; one that contains itself is skipped
+};
+
+/// Adds all shapes of a VRML 2.0 or 1.0 tree to the reading's mesh.
+void walk(Reading& reading, const Scene& scene, const Place& place);
+void walk_vrml2(Reading& reading, const Scene& scene, const Place& place);
+void walk_vrml1(Reading& reading, const Scene& scene, const Place& place);
+
+/// One level deeper. @throws InputError at `node` if that exceeds the limit.
+Place deeper(const Reading& reading, const Place& place, const Node& node);
+
+/// The Inline or WWWInline `node`: its file's shapes, at `place`.
+void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Place& place);
+
+/// Matrix of a Transform node, of either version (VRML97, 6.52).
+Eigen::Affine3d transform_of(const Reference& node, const char* scale_field);
+
+}  // namespace hilbrush::vrml

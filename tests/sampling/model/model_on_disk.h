@@ -1,0 +1,97 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "sampling/base/input_error.h"
+#include "sampling/model/model_file.h"
+#include "tests/support/temporary_folder.h"
+
+/// Models that tests write themselves.
+namespace hilbrush {
+
+/// A folder of the test's own, gone at its end.
+class ModelOnDisk {
+ public:
+  ModelOnDisk() { std::filesystem::create_directories(folder()); }
+
+  std::filesystem::path folder() const { return outer() / "model"; }
+  std::filesystem::path outer() const { return outer_.path(); }
+  std::filesystem::path write(const std::string& name, const std::string& bytes) const {
+    return outer_.write("model/" + name, bytes);
+  }
+  Model load(const std::string& name, const std::string& bytes, const ModelLimits& limits = {}) const {
+    return load_model(write(name, bytes), fake_image, limits);
+  }
+  /// VRML 2.0 with its header.
+  Model load_vrml(const std::string& body, const ModelLimits& limits = {}) const {
+    return load("model.wrl", "#VRML V2.0 utf8\n" + body, limits);
+  }
+  /// The sentence of the refusal, with its place; empty if the model was read.
+  std::string refusal(const std::string& name, const std::string& bytes, const ModelLimits& limits = {}) const {
+    try {
+      load(name, bytes, limits);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::string vrml_refusal(const std::string& body, const ModelLimits& limits = {}) const {
+    return refusal("model.wrl", "#VRML V2.0 utf8\n" + body, limits);
+  }
+
+  /// Any existing file is a picture: 2 x 1 texels, dark and light; "grey" in its name makes it one channel.
+  static std::optional<Texture> fake_image(const std::filesystem::path& file, std::size_t, std::string& reason) {
+    if (!std::filesystem::exists(file)) {
+      reason = "there is no such file";
+      return std::nullopt;
+    }
+    Texture texture{2, 1, 3, {.25f, .75f}, {}, file.filename().string()};
+    if (texture.name.find("grey") != std::string::npos) texture.channels = 1;
+    return texture;
+  }
+
+ private:
+  testing_support::TemporaryFolder outer_;
+};
+
+/// Of a closed mesh; positive if its triangles run counter-clockwise seen from outside.
+inline double signed_volume(const TexturedMesh& mesh) {
+  double volume = 0;
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
+    volume += mesh.corner(t, 0).dot(mesh.corner(t, 1).cross(mesh.corner(t, 2))) / 6;
+  return volume;
+}
+
+inline double area(const TexturedMesh& mesh) {
+  double sum = 0;
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) sum += mesh.area_vector(t).norm();
+  return sum;
+}
+
+/// True if a warning holds `words`.
+inline bool warns(const Model& model, const std::string& words) {
+  for (const std::string& warning : model.warnings)
+    if (warning.find(words) != std::string::npos) return true;
+  return false;
+}
+
+/// The texture coordinates at a place of the surface; those of the nearest triangle whose plane holds it.
+inline Eigen::Vector2d uv_at(const TexturedMesh& mesh, const Eigen::Vector3d& place) {
+  double nearest = 1e300;
+  Eigen::Vector2d found(-1e9, -1e9);
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
+    const Eigen::Vector3d normal = mesh.area_vector(t);
+    Eigen::Vector3d b;
+    for (int c = 0; c < 3; ++c)
+      b[c] = .5 * (mesh.corner(t, (c + 1) % 3) - place).cross(mesh.corner(t, (c + 2) % 3) - place).dot(normal) /
+             normal.squaredNorm();
+    const double distance =
+        std::abs((place - mesh.corner(t, 0)).dot(normal.normalized())) + 10 * std::max(0., -b.minCoeff());
+    if (distance >= nearest) continue;
+    nearest = distance;
+    found = b[0] * mesh.corner_uv[t][0] + b[1] * mesh.corner_uv[t][1] + b[2] * mesh.corner_uv[t][2];
+  }
+  return found;
+}
+
+}  // namespace hilbrush
