@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "planner/cell_description.h"
-#include "sampling/tone.h"
+#include "sampling/options/tone_options.h"
 
 /// Cell descriptions from JSON files, read strictly: every key is required unless its default is documented, unknown
 /// keys, wrong types, wrong units (the unit is part of the key) and values out of range are InputErrors with the file

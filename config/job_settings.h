@@ -6,8 +6,8 @@
 
 #include "planner/mounting_options.h"
 #include "planner/plan_options.h"
-#include "sampling/sample_options.h"
-#include "sampling/tone.h"
+#include "sampling/options/sample_options.h"
+#include "sampling/options/tone_options.h"
 
 /// What an operator may set for one job: the keys of a job file, of job.submit's "settings", and the flags of the
 /// command (size_mm: --size-mm).

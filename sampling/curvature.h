@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sampling/model/textured_mesh.h"
-#include "sampling/sample_options.h"
+#include "sampling/options/sample_options.h"
 
 /// Curvature of a mesh, and dots that follow it instead of a picture (the thesis, section 6.1.3): more dots where the
 /// surface bends. The mesh is repaired: triangles that touch share vertices and face the same way.

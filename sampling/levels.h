@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sampling/dots.h"
-#include "sampling/tone.h"
+#include "sampling/options/tone_options.h"
 #include "sampling/tone_field.h"
 
 /// Several energies a dot may have. Each dot takes the smallest level that its tone needs: light places get more,

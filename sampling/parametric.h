@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling/sample_options.h"
+#include "sampling/options/sample_options.h"
 
 /// Dots on surfaces that are given by a formula, as in chapters 4 and 5 of the thesis:
 ///   surface, density -> adaptive curve over [0, 1]^2 -> area of each leaf -> strata -> dots.

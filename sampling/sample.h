@@ -8,7 +8,7 @@
 #include "sampling/base/progress.h"
 #include "sampling/dots.h"
 #include "sampling/model/textured_mesh.h"
-#include "sampling/sample_options.h"
+#include "sampling/options/sample_options.h"
 #include "sampling/tone_field.h"
 
 /// Mesh to dots, the entry of sampling/:

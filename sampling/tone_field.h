@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "sampling/model/textured_mesh.h"
-#include "sampling/tone.h"
+#include "sampling/options/tone_options.h"
 #include "sampling/tone/asked_atlas.h"
 #include "sampling/tone/triangle_tone.h"
 

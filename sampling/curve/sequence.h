@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sampling/sample_options.h"
+#include "sampling/options/sample_options.h"
 
 /// Sequences of numbers in [0, 1), rising: where along the curve's mass the dots go (the thesis, sections 2.1.2
 /// and 4.4).

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "planner/cell_description.h"
+#include "sampling/options/tone_options.h"
 #include "sampling/place_picture.h"
-#include "sampling/tone.h"
 
 /// From a grey wedge to a tone curve (README, "Tone"). The wedge is a flat strip of 11 or more steps; each is painted
 /// and its mean coverage read.

@@ -1,4 +1,4 @@
-#include "sampling/tone.h"
+#include "sampling/options/tone_options.h"
 
 #include <algorithm>
 
