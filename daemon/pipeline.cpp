@@ -27,7 +27,7 @@
 #include "sampling/base/input_error.h"
 #include "sampling/base/sha256.h"
 #include "sampling/curvature.h"
-#include "sampling/dots_file.h"
+#include "sampling/dots/dots_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "planner/plan.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/textured_mesh.h"
 

@@ -10,7 +10,7 @@
 #include "planner/exposure_program.h"
 #include "planner/plan_options.h"
 #include "sampling/base/progress.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 
 /// Dots to program, the entry of planner/:

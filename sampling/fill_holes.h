@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "sampling/base/progress.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/sample.h"
 #include "sampling/tone_field.h"
 

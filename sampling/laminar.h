@@ -1,6 +1,6 @@
 #pragma once
 #include "sampling/base/progress.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/sample.h"
 #include "sampling/tone_field.h"
 

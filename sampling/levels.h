@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/options/tone_options.h"
 #include "sampling/tone_field.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sampling/base/progress.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/options/tone_options.h"
 #include "sampling/tone_field.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 #include "sampling/tone_field.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "sampling/base/progress.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 #include "sampling/options/sample_options.h"
 #include "sampling/tone_field.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "daemon/quality/quality.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/parametric.h"
 #include "sampling/quality.h"
 #include "sampling/sample.h"

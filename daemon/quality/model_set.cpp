@@ -4,11 +4,11 @@
 #include "daemon/quality/measured_set.h"
 #include "sampling/base/input_error.h"
 #include "sampling/curvature.h"
+#include "sampling/dots/read_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/read_dots.h"
 
 namespace hilbrush {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "planner/reach/reach.h"
 #include "sampling/base/progress.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 
 /// What pose search hands on: which dots are exposed, in which order, with which joints. How the axes get from one to
 /// the next is the program builder's.

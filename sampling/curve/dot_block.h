@@ -3,7 +3,7 @@
 
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/curve/strata.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 
 namespace hilbrush {
 

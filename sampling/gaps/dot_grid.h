@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 
 /// Dots by place: which is nearest, and which are near. Dots may be added; look-ups are thread-safe between additions.
 namespace hilbrush {

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 
 namespace hilbrush {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/edges.h"
 #include "sampling/model/growing_ball.h"
 #include "sampling/model/textured_mesh.h"

@@ -17,7 +17,7 @@
 #include <string>
 
 #include "sampling/curve/patches.h"
-#include "sampling/dots_file.h"
+#include "sampling/dots/dots_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"

@@ -8,7 +8,7 @@
 
 #include "config/json_reader.h"
 #include "sampling/base/input_error.h"
-#include "sampling/dots_file.h"
+#include "sampling/dots/dots_file.h"
 #include "tests/support/temporary_folder.h"
 
 /// What `hilbrush-pipeline quality` does, from a request to figures and plots.

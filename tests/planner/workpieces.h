@@ -3,7 +3,7 @@
 #include <string>
 
 #include "planner/plan.h"
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 
 /// Small workpieces and dots for the tests of planning.

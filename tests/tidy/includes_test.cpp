@@ -165,7 +165,7 @@ TEST(Includes, TheTableRefusesWhatItShould) {
   EXPECT_TRUE(refused("sampling/model/vrml/parser.cpp", "sampling/sample.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "sampling/images/image_file.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "OpenImageIO/imageio.h", false));
-  EXPECT_TRUE(refused("sampling/base/sha256.cpp", "sampling/dots.h", true));
+  EXPECT_TRUE(refused("sampling/base/sha256.cpp", "sampling/dots/dots.h", true));
   EXPECT_TRUE(refused("drivers/laser.h", "planner/cell_description.h", true));
   EXPECT_TRUE(refused("drivers/laser.h", "Eigen/Core", false));
   EXPECT_TRUE(refused("sim/devices/sim_cell.cpp", "sampling/model/textured_mesh.h", true));

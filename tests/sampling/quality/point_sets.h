@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 
 /// Point sets whose figures are known.

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 
 /// Dots as a file that people can look at: binary little-endian PLY, opens in MeshLab, CloudCompare and Open3D as a
 /// point cloud.

@@ -1,7 +1,7 @@
 #pragma once
 #include <filesystem>
 
-#include "sampling/dots.h"
+#include "sampling/dots/dots.h"
 
 /// Reads back what write_dots wrote.
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "sampling/read_dots.h"
+#include "sampling/dots/read_dots.h"
 
 #include <array>
 #include <bit>

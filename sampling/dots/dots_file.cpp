@@ -1,4 +1,4 @@
-#include "sampling/dots_file.h"
+#include "sampling/dots/dots_file.h"
 
 #include <array>
 #include <bit>
