@@ -9,7 +9,7 @@
 #include "daemon/report.h"
 #include "daemon/wedge.h"
 #include "sampling/base/input_error.h"
-#include "sampling/levels.h"
+#include "sampling/tone/levels.h"
 
 namespace hilbrush {
 namespace {

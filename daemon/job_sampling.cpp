@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "config/cell_file.h"
-#include "sampling/levels.h"
+#include "sampling/tone/levels.h"
 
 namespace hilbrush {
 namespace {

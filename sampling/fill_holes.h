@@ -4,7 +4,7 @@
 #include "sampling/base/progress.h"
 #include "sampling/dots/dots.h"
 #include "sampling/sample.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// Dots added where a placement has left holes (the thesis, section 7.1.1).
 namespace hilbrush {

@@ -2,7 +2,7 @@
 #include "sampling/base/progress.h"
 #include "sampling/dots/dots.h"
 #include "sampling/sample.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// Laminar slicing: what space-filling curves replace, as a baseline (the thesis, section 7.3, figures 7.11 and 7.14 to
 /// 7.16; Sung et al., McPherson et al.).

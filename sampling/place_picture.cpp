@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sampling/laminar.h"
-#include "sampling/levels.h"
+#include "sampling/tone/levels.h"
 
 namespace hilbrush {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "sampling/base/check.h"
-#include "sampling/levels.h"
 #include "sampling/tone/asked_atlas.h"
+#include "sampling/tone/levels.h"
 
 namespace hilbrush {
 namespace {

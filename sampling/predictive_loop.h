@@ -6,7 +6,7 @@
 #include "sampling/base/progress.h"
 #include "sampling/dots/dots.h"
 #include "sampling/options/tone_options.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// Places dots, predicts the picture they will make, and asks again where it is too light or too dark.
 ///

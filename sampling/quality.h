@@ -9,7 +9,7 @@
 
 #include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// How good a placement is, in figures: discrepancy, spectrum, spacing, holes, path. After chapter 5 and section 6.2.1
 /// of the thesis, with rms values beside its maxima, balls beside its sets of whole triangles, and holes and spacing,

@@ -9,7 +9,7 @@
 #include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 #include "sampling/options/sample_options.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// Mesh to dots, the entry of sampling/:
 ///   repair_mesh -> components -> flatten (cut_to_disk, map_to_square) -> SurfaceCurve (base tree of the adaptive

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sampling/curve/sheet.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// The affine maps between a face's triangle, the square, space and the texture; and a store of those made last, so
 /// that quads which share a face share its frame.

@@ -4,8 +4,8 @@
 
 #include "sampling/base/check.h"
 #include "sampling/base/cross.h"
+#include "sampling/tone/tone_field.h"
 #include "sampling/tone/tone_polygon.h"
-#include "sampling/tone_field.h"
 
 namespace hilbrush {
 namespace {

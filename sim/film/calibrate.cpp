@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "sampling/base/input_error.h"
-#include "sampling/levels.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/levels.h"
+#include "sampling/tone/tone_field.h"
 #include "sim/film/film.h"
 #include "sim/film/picture_means.h"
 

@@ -35,8 +35,8 @@ ToneCurve calibrate_tone(const Wedge& wedge, double asked_max);
 std::vector<double> wedge_steps(std::vector<double> shares, double asked_max, std::span<const double> levels);
 
 /// The curve from a wedge that was painted and measured once, linear between its steps. With several levels
-/// (sampling/levels.h) each has steps of its own, and where the next level takes over the curve jumps: the same energy
-/// in fewer, stronger dots covers less.
+/// (sampling/tone/levels.h) each has steps of its own, and where the next level takes over the curve jumps: the same
+/// energy in fewer, stronger dots covers less.
 /// @throws InputError if it has fewer than five steps, or shows no paint at all.
 ToneCurve tone_curve_of(const std::vector<WedgeStep>& steps, double asked_max, std::span<const double> levels);
 

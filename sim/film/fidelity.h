@@ -1,7 +1,7 @@
 #pragma once
 #include <functional>
 
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 #include "sim/film/film.h"
 
 /// How well the painted picture matches the wanted one, in linear-light coverage on the surface (README, "Fidelity").

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sampling/predictive_loop.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 #include "sim/film/film.h"
 
 /// Wanted and painted coverage as the eye takes them in: Gaussian means on the surface.

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sampling/images/image_file.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 #include "sim/film/film.h"
 #include "sim/film/orthographic_view.h"
 

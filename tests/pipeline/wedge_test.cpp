@@ -10,7 +10,7 @@
 #include "sampling/base/input_error.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/model_file.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 namespace hilbrush {
 namespace {

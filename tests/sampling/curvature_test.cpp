@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -5,7 +5,7 @@
 
 #include "sampling/dots/dots.h"
 #include "sampling/options/tone_options.h"
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 /// Several energies a dot may have. Each dot takes the smallest level that its tone needs: light places get more,
 /// weaker dots, and less grain, dark places fewer and stronger ones, and the same picture needs fewer dots. A level is

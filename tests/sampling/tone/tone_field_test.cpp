@@ -1,4 +1,4 @@
-#include "sampling/tone_field.h"
+#include "sampling/tone/tone_field.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sampling/levels.h"
+#include "sampling/tone/levels.h"
 
 #include <gtest/gtest.h>
 
