@@ -1,5 +1,5 @@
 #pragma once
-#include "sampling/sample.h"
+#include "sampling/curve/stream_dots.h"
 
 /// `blue`: dots as far from each other as their strata allow, in no direction more than in another.
 namespace hilbrush {

@@ -2,8 +2,8 @@
 #include <cstdint>
 
 #include "sampling/base/progress.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots.h"
-#include "sampling/sample.h"
 #include "sampling/tone/tone_field.h"
 
 /// Dots added where a placement has left holes (the thesis, section 7.1.1).

@@ -1,7 +1,7 @@
 #pragma once
 #include <functional>
 
-#include "sampling/sample.h"
+#include "sampling/curve/stream_dots.h"
 
 /// `fine`: dots that have been placed already are moved for the picture that the paint will show.
 namespace hilbrush {

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "daemon/quality/quality.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots.h"
 #include "sampling/parametric.h"
 #include "sampling/quality.h"
-#include "sampling/sample.h"
 
 /// Where the dots to be measured come from, and what they are held against.
 namespace hilbrush {

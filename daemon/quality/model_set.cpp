@@ -3,7 +3,7 @@
 #include "daemon/job_sampling.h"
 #include "daemon/quality/measured_set.h"
 #include "sampling/base/input_error.h"
-#include "sampling/curvature.h"
+#include "sampling/curve/curvature.h"
 #include "sampling/dots/read_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"

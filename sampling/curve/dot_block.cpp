@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "sampling/base/check.h"
-#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/project_to_surface.h"
 #include "sampling/curve/stratum.h"
 
 namespace hilbrush {

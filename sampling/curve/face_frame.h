@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "sampling/curve/sheet.h"
+#include "sampling/curve/chart.h"
 #include "sampling/tone/tone_field.h"
 
 /// The affine maps between a face's triangle, the square, space and the texture; and a store of those made last, so

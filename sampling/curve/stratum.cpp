@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/project_to_surface.h"
 #include "sampling/curve/quad_walk.h"
 
 namespace hilbrush {

@@ -6,7 +6,7 @@
 
 #include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
-#include "sampling/curve/lay_out.h"
+#include "sampling/curve/build_charts.h"
 #include "sampling/disk/components.h"
 
 namespace hilbrush {

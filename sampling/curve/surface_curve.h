@@ -2,9 +2,9 @@
 #include <array>
 #include <vector>
 
-#include "sampling/curve/sheet.h"
+#include "sampling/curve/chart.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/model/edges.h"
-#include "sampling/sample.h"
 
 /// What SurfaceCurve keeps of a mesh: sheets with their base trees, and what a dot needs to know of its surroundings.
 namespace hilbrush {

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/project_to_surface.h"
 #include "sampling/gaps/dot_grid.h"
 
 /// Whether a place is the middle of a hole; see fill_holes.h for what a gap is.

@@ -1,6 +1,6 @@
 #pragma once
-#include "sampling/curve/put_on_surface.h"
-#include "sampling/sample.h"
+#include "sampling/curve/project_to_surface.h"
+#include "sampling/curve/stream_dots.h"
 
 /// A dot's place while it moves: on the surface, always.
 namespace hilbrush {

@@ -8,13 +8,13 @@
 #include <exception>
 #include <numbers>
 
+#include "sampling/curve/stream_dots.h"
 #include "sampling/fill_holes.h"
 #include "sampling/laminar.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
 #include "sampling/parametric.h"
-#include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
 #include "tests/bench/process_usage.h"
 

@@ -17,12 +17,12 @@
 #include <string>
 
 #include "sampling/curve/patches.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/sample.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/meshes.h"
 #include "tests/support/subdivide.h"

@@ -7,12 +7,12 @@
 #include <cstdlib>
 #include <string>
 
+#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
 #include "sampling/quality.h"
-#include "sampling/sample.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"
 

@@ -15,11 +15,11 @@
 #include "planner/plan.h"
 #include "planner/program_check.h"
 #include "sampling/base/sha256.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/sample.h"
 
 namespace {
 

@@ -16,12 +16,12 @@
 
 #include "config/job_settings.h"
 #include "sampling/base/input_error.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
 #include "sampling/quality.h"
-#include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
 
 namespace {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "sampling/curve/stream_dots.h"
 #include "sampling/fill_holes.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
@@ -21,7 +22,6 @@
 #include "sampling/plot.h"
 #include "sampling/point_sets.h"
 #include "sampling/quality.h"
-#include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
 
 namespace {

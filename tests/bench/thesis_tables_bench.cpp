@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
@@ -20,7 +21,6 @@
 #include "sampling/plot.h"
 #include "sampling/point_sets.h"
 #include "sampling/quality.h"
-#include "sampling/sample.h"
 #include "tests/bench/answer_hash.h"
 
 namespace {

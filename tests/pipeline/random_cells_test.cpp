@@ -13,8 +13,8 @@
 #include "planner/plan.h"
 #include "planner/program_check.h"
 #include "sampling/base/input_error.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/model/mesh_repair.h"
-#include "sampling/sample.h"
 #include "sim/film/film.h"
 #include "tests/pipeline/tick_witness.h"
 

@@ -162,7 +162,7 @@ TEST(Includes, TheTableRefusesWhatItShould) {
     return !is_allowed(*rule_of(path), header, is_ours);
   };
   EXPECT_TRUE(refused("sampling/dots.cpp", "planner/plan.h", true));
-  EXPECT_TRUE(refused("sampling/model/vrml/parser.cpp", "sampling/sample.h", true));
+  EXPECT_TRUE(refused("sampling/model/vrml/parser.cpp", "sampling/curve/stream_dots.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "sampling/images/image_file.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "OpenImageIO/imageio.h", false));
   EXPECT_TRUE(refused("sampling/base/sha256.cpp", "sampling/dots/dots.h", true));

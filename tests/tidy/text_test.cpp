@@ -31,7 +31,7 @@ TEST(Text, FilesAreFound) {
   // The other tests prove nothing about an empty list.
   EXPECT_GT(source_files().size(), 50u);
   EXPECT_TRUE(std::any_of(source_files().begin(), source_files().end(),
-                          [](const SourceFile& f) { return f.path == "sampling/sample.h"; }));
+                          [](const SourceFile& f) { return f.path == "sampling/curve/stream_dots.h"; }));
 }
 
 TEST(Text, TopLevelIsAsFixed) {

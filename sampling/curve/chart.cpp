@@ -1,4 +1,4 @@
-#include "sampling/curve/sheet.h"
+#include "sampling/curve/chart.h"
 
 #include <algorithm>
 #include <cmath>

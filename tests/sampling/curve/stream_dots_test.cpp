@@ -1,4 +1,4 @@
-#include "sampling/sample.h"
+#include "sampling/curve/stream_dots.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -1,4 +1,4 @@
-#include "sampling/curvature.h"
+#include "sampling/curve/curvature.h"
 
 #include <gtest/gtest.h>
 

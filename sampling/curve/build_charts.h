@@ -1,9 +1,9 @@
 #pragma once
 #include <vector>
 
-#include "sampling/curve/sheet.h"
+#include "sampling/curve/chart.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/disk/components.h"
-#include "sampling/sample.h"
 
 /// From components to sheets: each is flattened, the pieces are chained, and their base trees are built.
 namespace hilbrush {

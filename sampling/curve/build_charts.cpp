@@ -1,4 +1,4 @@
-#include "sampling/curve/lay_out.h"
+#include "sampling/curve/build_charts.h"
 
 #include <tbb/parallel_for.h>
 

@@ -1,4 +1,4 @@
-#include "sampling/sample.h"
+#include "sampling/curve/stream_dots.h"
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>

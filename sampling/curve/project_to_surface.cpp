@@ -1,4 +1,4 @@
-#include "sampling/curve/put_on_surface.h"
+#include "sampling/curve/project_to_surface.h"
 
 #include <algorithm>
 #include <vector>
