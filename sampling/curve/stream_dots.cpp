@@ -9,7 +9,7 @@
 
 #include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
-#include "sampling/blue.h"
+#include "sampling/blue/blue.h"
 #include "sampling/curve/curve_mass.h"
 #include "sampling/curve/dot_block.h"
 

@@ -1,4 +1,4 @@
-#include "sampling/relax/colouring.h"
+#include "sampling/blue/coloring.h"
 
 #include <algorithm>
 

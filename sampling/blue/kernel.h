@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 
-#include "sampling/relax/stratum_places.h"
+#include "sampling/blue/stratum_places.h"
 
 /// How dots push each other, and how the surface pulls them.
 namespace hilbrush {

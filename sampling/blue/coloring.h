@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sampling/relax/touching_balls.h"
+#include "sampling/blue/touching_balls.h"
 
 namespace hilbrush {
 

@@ -1,4 +1,4 @@
-#include "sampling/relax/touching_balls.h"
+#include "sampling/blue/touching_balls.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>

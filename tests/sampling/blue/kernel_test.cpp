@@ -1,4 +1,4 @@
-#include "sampling/relax/kernel.h"
+#include "sampling/blue/kernel.h"
 
 #include <gtest/gtest.h>
 

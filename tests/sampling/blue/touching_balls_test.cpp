@@ -1,4 +1,4 @@
-#include "sampling/relax/touching_balls.h"
+#include "sampling/blue/touching_balls.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "sampling/relax/colouring.h"
+#include "sampling/blue/coloring.h"
 
 namespace hilbrush {
 namespace {

@@ -1,4 +1,4 @@
-#include "sampling/blue.h"
+#include "sampling/blue/blue.h"
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -8,12 +8,12 @@
 #include <cmath>
 
 #include "sampling/base/check.h"
+#include "sampling/blue/coloring.h"
+#include "sampling/blue/kernel.h"
+#include "sampling/blue/stratum_places.h"
 #include "sampling/curve/dot_triangle.h"
 #include "sampling/curve/sequence.h"
 #include "sampling/model/growing_ball.h"
-#include "sampling/relax/colouring.h"
-#include "sampling/relax/kernel.h"
-#include "sampling/relax/stratum_places.h"
 
 namespace hilbrush {
 namespace {

@@ -1,4 +1,4 @@
-#include "sampling/blue.h"
+#include "sampling/blue/blue.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -1,4 +1,4 @@
-#include "sampling/relax/stratum_places.h"
+#include "sampling/blue/stratum_places.h"
 
 #include <tbb/parallel_for.h>
 
