@@ -5,7 +5,7 @@
 
 #include "sampling/curve/stream_dots.h"
 #include "sampling/fill_holes.h"
-#include "sampling/fine.h"
+#include "sampling/fine/fine.h"
 #include "sampling/predictive_loop.h"
 
 /// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sampling/curve/stream_dots.h"
-#include "sampling/relax/surface_place.h"
+#include "sampling/curve/surface_place.h"
 
 /// The strata as `blue` sees them: a few places along each, where its dot may be, and how large it is.
 namespace hilbrush {

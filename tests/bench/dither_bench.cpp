@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sampling/curve/stream_dots.h"
-#include "sampling/fine.h"
+#include "sampling/fine/fine.h"
 #include "tests/bench/dither_pictures.h"
 #include "tests/support/meshes.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "config/cell_file.h"
-#include "sampling/fine.h"
+#include "sampling/fine/fine.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"

@@ -1,4 +1,4 @@
-#include "sampling/fine.h"
+#include "sampling/fine/fine.h"
 
 #include <tbb/parallel_for.h>
 
@@ -10,8 +10,8 @@
 #include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
 #include "sampling/curve/dot_triangle.h"
-#include "sampling/relax/paint_model.h"
-#include "sampling/relax/surface_place.h"
+#include "sampling/curve/surface_place.h"
+#include "sampling/fine/paint_model.h"
 
 namespace hilbrush {
 namespace {

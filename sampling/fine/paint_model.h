@@ -2,8 +2,8 @@
 #include <memory>
 #include <vector>
 
-#include "sampling/fine.h"
-#include "sampling/relax/cube_grid.h"
+#include "sampling/fine/cube_grid.h"
+#include "sampling/fine/fine.h"
 
 /// The painted picture as `fine` sees it.
 namespace hilbrush {

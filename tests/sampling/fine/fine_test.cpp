@@ -1,4 +1,4 @@
-#include "sampling/fine.h"
+#include "sampling/fine/fine.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

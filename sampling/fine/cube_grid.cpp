@@ -1,4 +1,4 @@
-#include "sampling/relax/cube_grid.h"
+#include "sampling/fine/cube_grid.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>

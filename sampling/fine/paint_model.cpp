@@ -1,4 +1,4 @@
-#include "sampling/relax/paint_model.h"
+#include "sampling/fine/paint_model.h"
 
 #include <tbb/parallel_for.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "sampling/relax/surface_place.h"
+#include "sampling/curve/surface_place.h"
 
 namespace hilbrush {
 namespace {
