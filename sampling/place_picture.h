@@ -6,7 +6,7 @@
 #include "sampling/curve/stream_dots.h"
 #include "sampling/fill_holes.h"
 #include "sampling/fine/fine.h"
-#include "sampling/predictive_loop.h"
+#include "sampling/predictive/predictive_loop.h"
 
 /// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of
 /// energy, the predictive loop, the search on the finished dots. place_dots() and the others do one thing each; this

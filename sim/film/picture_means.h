@@ -2,7 +2,7 @@
 #include <span>
 #include <vector>
 
-#include "sampling/predictive_loop.h"
+#include "sampling/predictive/predictive_loop.h"
 #include "sampling/tone/tone_field.h"
 #include "sim/film/film.h"
 

@@ -1,4 +1,4 @@
-#include "sampling/predictive_loop.h"
+#include "sampling/predictive/predictive_loop.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
