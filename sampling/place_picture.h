@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "sampling/curve/stream_dots.h"
-#include "sampling/fill_holes.h"
 #include "sampling/fine/fine.h"
+#include "sampling/gaps/fill_holes.h"
 #include "sampling/predictive/predictive_loop.h"
 
 /// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of

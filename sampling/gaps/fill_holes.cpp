@@ -1,4 +1,4 @@
-#include "sampling/fill_holes.h"
+#include "sampling/gaps/fill_holes.h"
 
 #include <tbb/parallel_for.h>
 

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "sampling/curve/stream_dots.h"
-#include "sampling/fill_holes.h"
+#include "sampling/gaps/fill_holes.h"
 #include "sampling/laminar.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "sampling/curve/stream_dots.h"
-#include "sampling/fill_holes.h"
+#include "sampling/gaps/fill_holes.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"

@@ -1,4 +1,4 @@
-#include "sampling/fill_holes.h"
+#include "sampling/gaps/fill_holes.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
