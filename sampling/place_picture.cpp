@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "sampling/laminar.h"
+#include "sampling/laminar/laminar.h"
 #include "sampling/tone/levels.h"
 
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "sampling/laminar.h"
+#include "sampling/laminar/laminar.h"
 
 #include <tbb/parallel_for.h>
 

@@ -10,7 +10,7 @@
 
 #include "sampling/curve/stream_dots.h"
 #include "sampling/gaps/fill_holes.h"
-#include "sampling/laminar.h"
+#include "sampling/laminar/laminar.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"

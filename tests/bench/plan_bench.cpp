@@ -27,7 +27,7 @@
 #include "sampling/base/angles.h"
 #include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
-#include "sampling/laminar.h"
+#include "sampling/laminar/laminar.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"

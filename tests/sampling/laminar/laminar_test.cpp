@@ -1,4 +1,4 @@
-#include "sampling/laminar.h"
+#include "sampling/laminar/laminar.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
