@@ -8,7 +8,7 @@
 #include "daemon/quality/quality.h"
 #include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots.h"
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
 #include "sampling/quality.h"
 
 /// Where the dots to be measured come from, and what they are held against.

@@ -5,7 +5,7 @@
 #include "daemon/quality/measured_set.h"
 #include "sampling/base/input_error.h"
 #include "sampling/model/mesh_repair.h"
-#include "sampling/point_sets.h"
+#include "sampling/parametric/point_sets.h"
 
 namespace hilbrush {
 namespace {

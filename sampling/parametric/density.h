@@ -1,5 +1,5 @@
 #pragma once
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
 
 namespace hilbrush {
 

@@ -1,4 +1,4 @@
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
 
 namespace hilbrush {
 

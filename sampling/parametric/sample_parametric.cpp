@@ -7,8 +7,8 @@
 #include "sampling/base/input_error.h"
 #include "sampling/curve/curve_moment.h"
 #include "sampling/curve/sequence.h"
-#include "sampling/parametric.h"
 #include "sampling/parametric/leaf_area.h"
+#include "sampling/parametric/parametric.h"
 
 namespace hilbrush {
 namespace {

@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "sampling/base/check.h"
-#include "sampling/parametric.h"
 #include "sampling/parametric/jet.h"
+#include "sampling/parametric/parametric.h"
 
 namespace hilbrush {
 namespace {

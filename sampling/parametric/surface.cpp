@@ -1,7 +1,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
 
 namespace hilbrush {
 namespace {

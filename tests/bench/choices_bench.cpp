@@ -14,7 +14,7 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
 #include "tests/bench/answer_hash.h"
 #include "tests/bench/process_usage.h"
 

@@ -18,9 +18,9 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
+#include "sampling/parametric/point_sets.h"
 #include "sampling/plot.h"
-#include "sampling/point_sets.h"
 #include "sampling/quality.h"
 #include "tests/bench/answer_hash.h"
 

@@ -1,4 +1,4 @@
-#include "sampling/parametric.h"
+#include "sampling/parametric/parametric.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -1,4 +1,4 @@
-#include "sampling/point_sets.h"
+#include "sampling/parametric/point_sets.h"
 
 #include <gtest/gtest.h>
 
