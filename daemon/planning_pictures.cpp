@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "sampling/plot.h"
+#include "sampling/quality/plot.h"
 #include "sim/film/canvas.h"
 #include "sim/film/orthographic_view.h"
 #include "sim/film/views.h"

@@ -9,7 +9,7 @@
 #include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots.h"
 #include "sampling/parametric/parametric.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 
 /// Where the dots to be measured come from, and what they are held against.
 namespace hilbrush {

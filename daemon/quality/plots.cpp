@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling/plot.h"
+#include "sampling/quality/plot.h"
 
 namespace hilbrush {
 namespace {

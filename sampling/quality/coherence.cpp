@@ -4,7 +4,7 @@
 #include "sampling/base/check.h"
 #include "sampling/curve/hilbert.h"
 #include "sampling/curve/peano.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 #include "sampling/quality/test_shapes.h"
 
 namespace hilbrush {

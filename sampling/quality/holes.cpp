@@ -3,8 +3,8 @@
 #include <numbers>
 
 #include "sampling/base/check.h"
-#include "sampling/quality.h"
 #include "sampling/quality/point_tree.h"
+#include "sampling/quality/quality.h"
 
 namespace hilbrush {
 namespace {

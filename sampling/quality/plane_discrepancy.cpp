@@ -2,8 +2,8 @@
 #include <numbers>
 
 #include "sampling/base/check.h"
-#include "sampling/quality.h"
 #include "sampling/quality/point_tree.h"
+#include "sampling/quality/quality.h"
 #include "sampling/quality/test_shapes.h"
 
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "sampling/plot.h"
+#include "sampling/quality/plot.h"
 
 #include <algorithm>
 #include <array>

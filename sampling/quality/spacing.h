@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 
 namespace hilbrush {
 

@@ -1,5 +1,5 @@
 #pragma once
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 
 namespace hilbrush {
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "sampling/model/edges.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 #include "sampling/quality/triangle_tree.h"
 
 namespace hilbrush {

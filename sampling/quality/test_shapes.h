@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sampling/curve/sequence.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 
 /// What all test shapes share: random numbers that any thread can have, and how errors become figures.
 namespace hilbrush {

@@ -1,5 +1,5 @@
 // Blue noise in the plane and on a mesh: power at low frequencies, anisotropy, spacing, largest hole, discrepancy, path
-// and CPU seconds of `jittered`, `centroid` and `blue`, by the library's own measures (sampling/quality.h).
+// and CPU seconds of `jittered`, `centroid` and `blue`, by the library's own measures (sampling/quality/quality.h).
 //   blue_bench [MODEL] [DOTS] [TRIANGLES]     MODEL is subdivided to that many triangles
 #include <cstdio>
 #include <cstdlib>
@@ -12,7 +12,7 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 #include "tests/support/meshes.h"
 #include "tests/support/subdivide.h"
 

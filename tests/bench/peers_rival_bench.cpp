@@ -12,7 +12,7 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"
 

@@ -19,8 +19,8 @@
 #include "sampling/model/placement.h"
 #include "sampling/parametric/parametric.h"
 #include "sampling/parametric/point_sets.h"
-#include "sampling/plot.h"
-#include "sampling/quality.h"
+#include "sampling/quality/plot.h"
+#include "sampling/quality/quality.h"
 #include "tests/bench/answer_hash.h"
 
 namespace {

@@ -4,8 +4,8 @@
 #include <numbers>
 #include <random>
 
-#include "sampling/quality.h"
 #include "sampling/quality/point_tree.h"
+#include "sampling/quality/quality.h"
 #include "tests/sampling/quality/point_sets.h"
 
 namespace hilbrush {

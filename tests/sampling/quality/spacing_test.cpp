@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 #include "tests/sampling/quality/point_sets.h"
 
 namespace hilbrush {

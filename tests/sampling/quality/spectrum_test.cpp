@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "sampling/base/input_error.h"
-#include "sampling/quality.h"
 #include "sampling/quality/point_transform.h"
+#include "sampling/quality/quality.h"
 #include "tests/sampling/quality/point_sets.h"
 #include "tests/support/meshes.h"
 

@@ -9,7 +9,7 @@
 #include "sampling/base/input_error.h"
 #include "sampling/curve/stream_dots.h"
 #include "sampling/model/nearest_in_triangle.h"
-#include "sampling/quality.h"
+#include "sampling/quality/quality.h"
 #include "tests/sampling/quality/point_sets.h"
 #include "tests/support/meshes.h"
 
