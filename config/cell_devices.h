@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "drivers/device_options.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// The `devices` of a cell file: which driver each device has, and what that driver needs to know.
 ///

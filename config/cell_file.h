@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/options/tone_options.h"
 
 /// Cell descriptions from JSON files, read strictly: every key is required unless its default is documented, unknown

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "config/json_reader.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 namespace hilbrush {
 namespace {

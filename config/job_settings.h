@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "planner/mounting_options.h"
-#include "planner/plan_options.h"
+#include "planner/cell_model/mounting_options.h"
+#include "planner/cell_model/plan_options.h"
 #include "sampling/options/sample_options.h"
 #include "sampling/options/tone_options.h"
 

@@ -8,7 +8,7 @@
 
 #include "daemon/program_limits.h"
 #include "drivers/driver_error.h"
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 
 namespace hilbrush {
 namespace {

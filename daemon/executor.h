@@ -9,7 +9,7 @@
 #include "daemon/journal.h"
 #include "daemon/motion_times.h"
 #include "drivers/cell.h"
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 
 /// Runs an exposure program on a cell: the only code that commands motion. One exposure: vias, move, in position and
 /// settled on both chains (by their word and by their measured positions), journal armed, pulse, laser proved off,

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "config/job_settings.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/place_picture.h"
 
 /// From a job's settings to its dots: the sampling part of the pipeline.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 
 namespace hilbrush {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// What moves really take beside what the time model foresees, as the least squares of
 ///   measured = delay + factor of the slowest axis * the time that its speed and acceleration promise

@@ -3,7 +3,7 @@
 #include <span>
 
 #include "daemon/report.h"
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 #include "sim/devices/emission_record.h"
 #include "sim/film/film.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "config/job_settings.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// Strings the stages together:
 ///   load_model -> place_on_table -> repair_mesh -> SurfaceCurve -> place_dots -> plan_exposures -> check_program

@@ -13,7 +13,7 @@
 #include "config/cell_file.h"
 #include "daemon/pipeline.h"
 #include "daemon/quality/quality.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sampling/base/input_error.h"
 
 namespace {

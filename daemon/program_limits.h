@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "drivers/laser.h"
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 
 /// Limits looked at again just before they matter, whatever the planner said. Pure functions, any thread.
 namespace hilbrush {

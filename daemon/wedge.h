@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "config/job_settings.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/film/calibrate.h"
 
 /// A grey wedge to be painted by the real cell, and its readings.

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// Closed-form kinematics of the cell, in the coordinates that planning searches: tilt A, rotation C, and yaw = J1 + J2
 /// + J4. Frames as in cell_description.h. No singularities but the arm's outer and inner rim, which solve_arm refuses.

@@ -1,6 +1,6 @@
 #pragma once
-#include "planner/cell_description.h"
-#include "planner/mounting_options.h"
+#include "planner/cell_model/cell_description.h"
+#include "planner/cell_model/mounting_options.h"
 #include "sampling/model/textured_mesh.h"
 
 /// How one job's object is held, applied to cell and mesh.

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "planner/mounting_options.h"
+#include "planner/cell_model/mounting_options.h"
 #include "planner/plan.h"
 #include "sampling/model/model_file.h"
 

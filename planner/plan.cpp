@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "planner/dose.h"
+#include "planner/cell_model/dose.h"
+#include "planner/cell_model/time_model.h"
 #include "planner/poses/follow_normal.h"
 #include "planner/poses/pose_search.h"
 #include "planner/poses/posed_dots.h"
 #include "planner/poses/program_builder.h"
 #include "planner/reach/reach.h"
 #include "planner/reach/transit.h"
-#include "planner/time_model.h"
 #include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
 

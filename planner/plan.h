@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "planner/exposure_program.h"
-#include "planner/plan_options.h"
+#include "planner/cell_model/exposure_program.h"
+#include "planner/cell_model/plan_options.h"
 #include "sampling/base/progress.h"
 #include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"

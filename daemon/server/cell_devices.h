@@ -6,7 +6,7 @@
 
 #include "config/cell_devices.h"
 #include "drivers/cell.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/base/input_error.h"
 
 /// The devices that a cell file names, and what only simulated ones can do.

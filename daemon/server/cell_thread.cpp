@@ -12,7 +12,7 @@
 #include <stdexcept>
 
 #include "drivers/driver_error.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sampling/base/check.h"
 #include "sampling/base/sha256.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/model/textured_mesh.h"
 
 /// The cell as the program check sees it: forward kinematics as a chain of transforms, the tool as a bundle of rays,

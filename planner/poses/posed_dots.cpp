@@ -1,6 +1,6 @@
 #include "planner/poses/posed_dots.h"
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 
 namespace hilbrush {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "planner/dose.h"
+#include "planner/cell_model/dose.h"
 #include "planner/reach/transit.h"
 #include "sampling/base/check.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 #include "sampling/base/angles.h"
 
 namespace hilbrush {

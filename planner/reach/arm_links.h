@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "planner/kinematics.h"
 
 /// Where the arm is: two links, capsules at fixed heights, over which J1 and J2 turn and through which the quill

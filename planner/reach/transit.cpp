@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 
 namespace hilbrush {
 namespace {

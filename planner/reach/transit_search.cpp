@@ -4,8 +4,8 @@
 #include <limits>
 #include <random>
 
+#include "planner/cell_model/time_model.h"
 #include "planner/reach/transit.h"
-#include "planner/time_model.h"
 
 /// The last resort of Transit: RRT-connect (Kuffner and LaValle 2000) in the six joints. What differs: edges are whole
 /// moves, each checked as the axes will really run it, which is not the same there and back; and samples are drawn near

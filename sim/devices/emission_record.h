@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// What the simulated laser really emitted, from where. Kept by the simulated devices, not by the controller: it is the
 /// witness.

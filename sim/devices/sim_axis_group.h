@@ -9,7 +9,7 @@
 
 #include "drivers/axis_group.h"
 #include "drivers/driver_error.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/devices/axis_motion.h"
 #include "sim/devices/sim_clock.h"
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "drivers/cell.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/devices/emission_record.h"
 
 /// The simulated cell in process: robot, table and laser behind the drivers' interfaces, on a clock that runs at the

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "drivers/laser.h"
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/devices/emission_record.h"
 #include "sim/devices/sim_clock.h"
 

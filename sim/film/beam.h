@@ -1,10 +1,11 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
-/// Where the light goes, from joint values alone. Written from the frames described in planner/cell_description.h and
-/// sharing no code with the planner's kinematics: it is there to catch their faults.
+/// Where the light goes, from joint values alone. Written from the frames described in
+/// planner/cell_model/cell_description.h and sharing no code with the planner's kinematics: it is there to catch their
+/// faults.
 namespace hilbrush {
 
 struct Beam {

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/options/tone_options.h"
 #include "sampling/place_picture.h"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/base/progress.h"
 #include "sampling/model/textured_mesh.h"
 #include "sim/devices/emission_record.h"

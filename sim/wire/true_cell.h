@@ -4,7 +4,7 @@
 #include <limits>
 #include <optional>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/devices/axis_motion.h"
 #include "sim/devices/emission_record.h"
 #include "sim/wire/cell_phase.h"

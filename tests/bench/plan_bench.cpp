@@ -20,10 +20,10 @@
 
 #include "config/cell_file.h"
 #include "config/job_settings.h"
+#include "planner/cell_model/time_model.h"
 #include "planner/plan.h"
 #include "planner/poses/posed_dots.h"
 #include "planner/program_check.h"
-#include "planner/time_model.h"
 #include "sampling/base/angles.h"
 #include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"

@@ -18,7 +18,7 @@
 #include "config/cell_file.h"
 #include "daemon/pipeline.h"
 #include "drivers/driver_error.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"

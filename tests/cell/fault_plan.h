@@ -2,7 +2,7 @@
 #include <random>
 #include <string>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/wire/fault_script.h"
 
 namespace hilbrush::test {

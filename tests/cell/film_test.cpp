@@ -4,7 +4,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/pipeline.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"

@@ -7,7 +7,7 @@
 #include <set>
 #include <thread>
 
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"
 #include "tests/daemon/daemon_process.h"

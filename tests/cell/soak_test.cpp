@@ -4,7 +4,7 @@
 #include <random>
 #include <set>
 
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "tests/cell/fault_plan.h"
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "daemon/journal.h"
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 #include "sim/devices/emission_record.h"
 
 /// The safety invariants by the film's side alone: from the devices' own record of emissions, and what the program

@@ -15,7 +15,7 @@
 
 #include "config/cell_file.h"
 #include "config/job_settings.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sampling/base/sha256.h"
 
 namespace hilbrush::test {

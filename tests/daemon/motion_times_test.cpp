@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 
 namespace hilbrush {
 namespace {

@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "planner/cell_description.h"
-#include "planner/exposure_program.h"
+#include "planner/cell_model/cell_description.h"
+#include "planner/cell_model/exposure_program.h"
 #include "sampling/base/angles.h"
 #include "tests/support/temporary_folder.h"
 

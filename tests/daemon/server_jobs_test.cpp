@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "config/rpc_errors.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
 

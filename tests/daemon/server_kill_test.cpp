@@ -14,7 +14,7 @@
 #include <random>
 #include <set>
 
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/daemon_process.h"

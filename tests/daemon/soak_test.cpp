@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/sim_devices.h"

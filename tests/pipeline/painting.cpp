@@ -9,7 +9,7 @@
 #include "config/cell_file.h"
 #include "daemon/executor.h"
 #include "daemon/pipeline.h"
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/placement.h"
 #include "sim/devices/sim_cell.h"

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "config/job_settings.h"
-#include "planner/cell_description.h"
-#include "planner/exposure_program.h"
+#include "planner/cell_model/cell_description.h"
+#include "planner/cell_model/exposure_program.h"
 #include "sim/devices/emission_record.h"
 #include "sim/film/film.h"
 

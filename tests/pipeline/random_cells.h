@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string>
 
-#include "planner/cell_description.h"
-#include "planner/plan_options.h"
+#include "planner/cell_model/cell_description.h"
+#include "planner/cell_model/plan_options.h"
 #include "sampling/model/textured_mesh.h"
 
 /// A cell, an object and settings of planning that nobody thought of, from a seed.

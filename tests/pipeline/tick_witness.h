@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sim/devices/sim_cell.h"
 
 /// Looks at the simulated cell's true joints on every control tick while the executor sleeps: positions, speeds and

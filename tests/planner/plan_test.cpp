@@ -6,12 +6,12 @@
 #include <cmath>
 #include <cstring>
 
+#include "planner/cell_model/dose.h"
+#include "planner/cell_model/time_model.h"
 #include "planner/check/check_cell.h"
-#include "planner/dose.h"
 #include "planner/program_check.h"
 #include "planner/reach/reach.h"
 #include "planner/reach/transit.h"
-#include "planner/time_model.h"
 #include "sampling/base/angles.h"
 #include "sampling/base/input_error.h"
 #include "tests/planner/workpieces.h"

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <string>
 
+#include "planner/cell_model/time_model.h"
 #include "planner/kinematics.h"
 #include "planner/reach/transit.h"
-#include "planner/time_model.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

@@ -3,7 +3,7 @@
 #include <numbers>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "sampling/base/angles.h"
 #include "sampling/model/textured_mesh.h"
 #include "sim/devices/emission_record.h"

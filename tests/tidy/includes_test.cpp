@@ -166,7 +166,7 @@ TEST(Includes, TheTableRefusesWhatItShould) {
   EXPECT_TRUE(refused("sampling/dots.cpp", "sampling/images/image_file.h", true));
   EXPECT_TRUE(refused("sampling/dots.cpp", "OpenImageIO/imageio.h", false));
   EXPECT_TRUE(refused("sampling/base/sha256.cpp", "sampling/dots/dots.h", true));
-  EXPECT_TRUE(refused("drivers/laser.h", "planner/cell_description.h", true));
+  EXPECT_TRUE(refused("drivers/laser.h", "planner/cell_model/cell_description.h", true));
   EXPECT_TRUE(refused("drivers/laser.h", "Eigen/Core", false));
   EXPECT_TRUE(refused("sim/devices/sim_cell.cpp", "sampling/model/textured_mesh.h", true));
   EXPECT_TRUE(refused("sim/film/film.cpp", "planner/plan.h", true));
@@ -175,8 +175,8 @@ TEST(Includes, TheTableRefusesWhatItShould) {
   EXPECT_TRUE(refused("daemon/server/server.cpp", "sim/film/film.h", true));
   EXPECT_TRUE(refused("daemon/hilbrushd_main.cpp", "planner/plan.h", true));
   EXPECT_TRUE(refused("planner/plan.cpp", "tests/tidy/source_tree.h", true));
-  EXPECT_FALSE(refused("sim/film/film.cpp", "planner/cell_description.h", true));
-  EXPECT_FALSE(refused("config/job_settings.cpp", "planner/plan_options.h", true));
+  EXPECT_FALSE(refused("sim/film/film.cpp", "planner/cell_model/cell_description.h", true));
+  EXPECT_FALSE(refused("config/job_settings.cpp", "planner/cell_model/plan_options.h", true));
 }
 
 }  // namespace hilbrush::tidy

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 #include "planner/kinematics.h"
 #include "planner/reach/object_rays.h"
 

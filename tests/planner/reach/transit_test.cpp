@@ -5,9 +5,9 @@
 #include <numbers>
 #include <random>
 
+#include "planner/cell_model/time_model.h"
 #include "planner/check/check_cell.h"
 #include "planner/poses/posed_dots.h"
-#include "planner/time_model.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {

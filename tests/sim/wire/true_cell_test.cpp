@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 #include "tests/daemon/program_fixture.h"
 
 namespace hilbrush {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// What planning makes and the executor runs: exposures in order, and the way-points of the moves between them.
 namespace hilbrush {

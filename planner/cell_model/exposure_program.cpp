@@ -1,4 +1,4 @@
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 
 #include <algorithm>
 

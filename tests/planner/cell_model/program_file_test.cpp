@@ -1,4 +1,4 @@
-#include "planner/program_file.h"
+#include "planner/cell_model/program_file.h"
 
 #include <gtest/gtest.h>
 

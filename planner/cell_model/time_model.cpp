@@ -1,4 +1,4 @@
-#include "planner/time_model.h"
+#include "planner/cell_model/time_model.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 
 /// An exposure program as a binary little-endian PLY: element `vertex` (one an exposure: x y z nx ny nz tone energy j1
 /// j2 j3 j4 a c power pulse incidence dot), element `via` (before j1 j2 j3 j4 a c); provenance and pitch in comments.

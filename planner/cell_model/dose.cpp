@@ -1,4 +1,4 @@
-#include "planner/dose.h"
+#include "planner/cell_model/dose.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 #include <algorithm>
 #include <cmath>

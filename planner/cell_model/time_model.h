@@ -1,5 +1,5 @@
 #pragma once
-#include "planner/cell_description.h"
+#include "planner/cell_model/cell_description.h"
 
 /// How long the cell takes: trapezoidal per axis, slowest axis, settle that grows with the move. Part of planner
 /// because plans need it, kept to std so that the daemon's ETA and the simulated devices' tests can compare against it.

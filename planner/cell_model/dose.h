@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "planner/exposure_program.h"
+#include "planner/cell_model/exposure_program.h"
 
 /// Energy into power and pulse.
 namespace hilbrush {
