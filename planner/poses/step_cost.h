@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "planner/kinematics.h"
+#include "planner/reach/kinematics.h"
 
 /// The time model for what search asks millions of times: move and settle between two exposures from one pose of the
 /// table, in single precision. Agrees with move_s() + settle_s() - settle_min_s to a rounding.

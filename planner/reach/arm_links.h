@@ -3,7 +3,7 @@
 #include <array>
 
 #include "planner/cell_model/cell_description.h"
-#include "planner/kinematics.h"
+#include "planner/reach/kinematics.h"
 
 /// Where the arm is: two links, capsules at fixed heights, over which J1 and J2 turn and through which the quill
 /// slides; lens and quill; and the column that all of it stands on.

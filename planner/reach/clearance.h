@@ -2,8 +2,8 @@
 #include <array>
 #include <cstdint>
 
-#include "planner/kinematics.h"
 #include "planner/reach/arm_links.h"
+#include "planner/reach/kinematics.h"
 #include "planner/reach/object_distance.h"
 #include "planner/reach/object_rays.h"
 

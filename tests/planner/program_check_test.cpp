@@ -8,7 +8,7 @@
 #include <string>
 
 #include "planner/cell_model/time_model.h"
-#include "planner/kinematics.h"
+#include "planner/reach/kinematics.h"
 #include "planner/reach/transit.h"
 #include "tests/planner/workpieces.h"
 

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "planner/cell_model/cell_description.h"
-#include "planner/kinematics.h"
+#include "planner/reach/kinematics.h"
 #include "planner/reach/object_rays.h"
 
 /// The reference for clearance: bodies as dense bundles of rays against the object, and as dense points against post

@@ -1,4 +1,4 @@
-#include "planner/kinematics.h"
+#include "planner/reach/kinematics.h"
 
 #include <algorithm>
 #include <cmath>
