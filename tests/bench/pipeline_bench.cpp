@@ -12,8 +12,8 @@
 
 #include "config/cell_file.h"
 #include "config/job_settings.h"
+#include "planner/check/program_check.h"
 #include "planner/plan.h"
-#include "planner/program_check.h"
 #include "sampling/base/sha256.h"
 #include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"

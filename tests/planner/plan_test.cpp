@@ -9,7 +9,7 @@
 #include "planner/cell_model/dose.h"
 #include "planner/cell_model/time_model.h"
 #include "planner/check/check_cell.h"
-#include "planner/program_check.h"
+#include "planner/check/program_check.h"
 #include "planner/reach/reach.h"
 #include "planner/reach/transit.h"
 #include "sampling/base/angles.h"

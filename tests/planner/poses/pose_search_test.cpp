@@ -8,7 +8,7 @@
 #include <cstring>
 #include <random>
 
-#include "planner/program_check.h"
+#include "planner/check/program_check.h"
 #include "sampling/base/angles.h"
 #include "tests/planner/workpieces.h"
 

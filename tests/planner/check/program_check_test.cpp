@@ -1,4 +1,4 @@
-#include "planner/program_check.h"
+#include "planner/check/program_check.h"
 
 #include <gtest/gtest.h>
 
