@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "planner/poses/leftovers.h"
 #include "planner/poses/ordering.h"
 #include "planner/poses/stations.h"
-#include "planner/poses/yaw_slack.h"
+#include "planner/poses/unserved_dots.h"
+#include "planner/poses/yaw_redundancy.h"
 #include "sampling/base/check.h"
 
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "planner/poses/leftovers.h"
+#include "planner/poses/unserved_dots.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

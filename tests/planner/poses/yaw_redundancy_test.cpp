@@ -1,4 +1,4 @@
-#include "planner/poses/yaw_slack.h"
+#include "planner/poses/yaw_redundancy.h"
 
 #include <gtest/gtest.h>
 
