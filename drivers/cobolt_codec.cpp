@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 
 namespace hilbrush::cobolt {
 std::string encode(std::string_view command) {

@@ -7,7 +7,7 @@
 
 #include "drivers/cobolt_codec.h"
 #include "drivers/driver_error.h"
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 
 namespace hilbrush {
 namespace {

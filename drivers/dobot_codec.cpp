@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 
 namespace hilbrush {
 namespace {

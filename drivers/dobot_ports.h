@@ -13,7 +13,7 @@
 #include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
 #include "drivers/dobot_codec.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 

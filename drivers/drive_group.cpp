@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "drivers/driver_error.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 namespace {

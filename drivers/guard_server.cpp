@@ -11,7 +11,7 @@
 #include <cstdio>
 
 #include "drivers/driver_error.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 namespace {

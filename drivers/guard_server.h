@@ -11,7 +11,7 @@
 #include "drivers/gate.h"
 #include "drivers/guard_codec.h"
 #include "drivers/laser_head.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 

@@ -14,7 +14,7 @@
 #include <cstring>
 
 #include "drivers/driver_error.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 namespace {

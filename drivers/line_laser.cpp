@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "drivers/driver_error.h"
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 
 namespace hilbrush {
 namespace {

@@ -11,7 +11,7 @@
 #include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
 #include "drivers/laser_head.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 

@@ -7,7 +7,7 @@
 
 #include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 struct _modbus;
 

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cstdio>
 
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 
 namespace hilbrush::obis {
 using line_codec::equals_ignoring_case;

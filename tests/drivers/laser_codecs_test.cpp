@@ -2,7 +2,7 @@
 
 #include "drivers/cobolt_codec.h"
 #include "drivers/guard_codec.h"
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 #include "drivers/obis_codec.h"
 
 namespace hilbrush {

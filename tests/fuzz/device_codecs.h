@@ -9,7 +9,7 @@
 #include "drivers/dobot_codec.h"
 #include "drivers/guard_codec.h"
 #include "drivers/guard_process.h"
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 #include "drivers/mapped_drive.h"
 #include "drivers/obis_codec.h"
 #include "drivers/oriental_az.h"

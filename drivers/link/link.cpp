@@ -1,4 +1,4 @@
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 #include <poll.h>
 #include <sys/eventfd.h>

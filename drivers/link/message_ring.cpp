@@ -1,4 +1,4 @@
-#include "drivers/message_ring.h"
+#include "drivers/link/message_ring.h"
 
 #include <algorithm>
 #include <cstdio>

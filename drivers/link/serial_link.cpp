@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 namespace {

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <memory>
 
-#include "drivers/link.h"
+#include "drivers/link/link.h"
 
 namespace hilbrush {
 namespace {

@@ -1,4 +1,4 @@
-#include "drivers/line_codec.h"
+#include "drivers/link/line_codec.h"
 
 #include <algorithm>
 #include <cctype>

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "drivers/driver_error.h"
-#include "drivers/message_ring.h"
+#include "drivers/link/message_ring.h"
 
 /// Byte links to devices: TCP, and serial ports by libserialport. Every call has a deadline in wall time; hang-ups are
 /// told from silence.
