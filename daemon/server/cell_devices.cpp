@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "drivers/dobot_robot.h"
+#include "drivers/dobot/dobot_robot.h"
 #include "drivers/drive_group.h"
 #include "drivers/gated_laser.h"
 #include "drivers/guard_process.h"

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <vector>
 
-#include "drivers/dobot_robot.h"
+#include "drivers/dobot/dobot_robot.h"
 #include "drivers/drive_group.h"
 #include "drivers/gated_laser.h"
 #include "drivers/obis_head.h"

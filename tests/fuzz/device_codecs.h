@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "drivers/cobolt_codec.h"
-#include "drivers/dobot_codec.h"
+#include "drivers/dobot/dobot_codec.h"
 #include "drivers/guard_codec.h"
 #include "drivers/guard_process.h"
 #include "drivers/link/line_codec.h"

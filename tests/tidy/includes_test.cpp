@@ -170,7 +170,7 @@ TEST(Includes, TheTableRefusesWhatItShould) {
   EXPECT_TRUE(refused("drivers/laser.h", "Eigen/Core", false));
   EXPECT_TRUE(refused("sim/devices/sim_cell.cpp", "sampling/model/textured_mesh.h", true));
   EXPECT_TRUE(refused("sim/film/film.cpp", "planner/plan.h", true));
-  EXPECT_TRUE(refused("sim/wire/dobot_controller.cpp", "drivers/dobot_codec.h", true));
+  EXPECT_TRUE(refused("sim/wire/dobot_controller.cpp", "drivers/dobot/dobot_codec.h", true));
   EXPECT_TRUE(refused("config/cell_file.cpp", "sampling/model/textured_mesh.h", true));
   EXPECT_TRUE(refused("daemon/server/server.cpp", "sim/film/film.h", true));
   EXPECT_TRUE(refused("daemon/hilbrushd_main.cpp", "planner/plan.h", true));

@@ -1,4 +1,4 @@
-#include "drivers/dobot_codec.h"
+#include "drivers/dobot/dobot_codec.h"
 
 #include <algorithm>
 #include <bit>

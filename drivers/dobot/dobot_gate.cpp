@@ -1,4 +1,4 @@
-#include "drivers/dobot_gate.h"
+#include "drivers/dobot/dobot_gate.h"
 
 #include <cmath>
 #include <string>

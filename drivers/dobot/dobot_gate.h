@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "drivers/clock.h"
-#include "drivers/dobot_robot.h"
+#include "drivers/dobot/dobot_robot.h"
 
 namespace hilbrush {
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/dobot_codec.h"
+#include "drivers/dobot/dobot_codec.h"
 #include "tests/drivers/loopback.h"
 
 namespace hilbrush::test {

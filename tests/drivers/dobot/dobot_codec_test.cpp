@@ -1,4 +1,4 @@
-#include "drivers/dobot_codec.h"
+#include "drivers/dobot/dobot_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "tests/drivers/dobot_peer.h"
+#include "tests/drivers/dobot/dobot_peer.h"
 
 /// Pinned to the words of the manual "TCP_IP Remote Control Interface Guide (4axis)".
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "drivers/dobot_robot.h"
+#include "drivers/dobot/dobot_robot.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "drivers/steady_clock.h"
-#include "tests/drivers/dobot_peer.h"
+#include "tests/drivers/dobot/dobot_peer.h"
 
 /// What the robot's driver makes of given frames, one by one: when a move is over, and when a pulse is.
 namespace hilbrush::test {

@@ -9,7 +9,7 @@
 #include "drivers/axis_group.h"
 #include "drivers/clock.h"
 #include "drivers/device_options.h"
-#include "drivers/dobot_ports.h"
+#include "drivers/dobot/dobot_ports.h"
 #include "drivers/gate.h"
 
 namespace hilbrush {

@@ -1,11 +1,11 @@
-#include "drivers/dobot_robot.h"
+#include "drivers/dobot/dobot_robot.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 
-#include "drivers/dobot_gate.h"
+#include "drivers/dobot/dobot_gate.h"
 #include "drivers/driver_error.h"
 
 namespace hilbrush {

@@ -12,7 +12,7 @@
 
 #include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
-#include "drivers/dobot_codec.h"
+#include "drivers/dobot/dobot_codec.h"
 #include "drivers/link/link.h"
 
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "drivers/dobot_ports.h"
+#include "drivers/dobot/dobot_ports.h"
 
 #include <poll.h>
 #include <sys/eventfd.h>
