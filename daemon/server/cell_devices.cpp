@@ -7,13 +7,13 @@
 #include <cerrno>
 #include <cstring>
 
+#include "drivers/axes/drive_group.h"
+#include "drivers/axes/mapped_drive.h"
+#include "drivers/axes/oriental_az.h"
 #include "drivers/dobot/dobot_robot.h"
-#include "drivers/drive_group.h"
 #include "drivers/gated_laser.h"
 #include "drivers/guard_process.h"
 #include "drivers/guarded_head.h"
-#include "drivers/mapped_drive.h"
-#include "drivers/oriental_az.h"
 #include "drivers/steady_clock.h"
 #include "sim/devices/emission_keeper.h"
 #include "sim/devices/sim_cell.h"

@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "drivers/mapped_drive.h"
-#include "drivers/oriental_az.h"
+#include "drivers/axes/mapped_drive.h"
+#include "drivers/axes/oriental_az.h"
 
 namespace hilbrush {
 namespace {

@@ -3,7 +3,7 @@
 #include <unistd.h>
 
 #include "config/register_map_file.h"
-#include "drivers/mapped_drive.h"
+#include "drivers/axes/mapped_drive.h"
 #include "tests/drivers/modbus_peer.h"
 #include "tests/drivers/wired_cell.h"
 

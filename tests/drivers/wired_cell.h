@@ -5,11 +5,11 @@
 #include <mutex>
 #include <vector>
 
+#include "drivers/axes/drive_group.h"
+#include "drivers/axes/oriental_az.h"
 #include "drivers/dobot/dobot_robot.h"
-#include "drivers/drive_group.h"
 #include "drivers/gated_laser.h"
 #include "drivers/obis_head.h"
-#include "drivers/oriental_az.h"
 #include "drivers/steady_clock.h"
 #include "sim/wire/wire_cell.h"
 #include "tests/daemon/program_fixture.h"

@@ -4,10 +4,10 @@
 #include <thread>
 
 #include "config/register_map_file.h"
-#include "drivers/drive_group.h"
+#include "drivers/axes/drive_group.h"
+#include "drivers/axes/mapped_drive.h"
+#include "drivers/axes/oriental_az.h"
 #include "drivers/driver_error.h"
-#include "drivers/mapped_drive.h"
-#include "drivers/oriental_az.h"
 #include "drivers/steady_clock.h"
 #include "tests/drivers/modbus_peer.h"
 

@@ -5,14 +5,14 @@
 #include <string_view>
 #include <vector>
 
+#include "drivers/axes/mapped_drive.h"
+#include "drivers/axes/oriental_az.h"
 #include "drivers/cobolt_codec.h"
 #include "drivers/dobot/dobot_codec.h"
 #include "drivers/guard_codec.h"
 #include "drivers/guard_process.h"
 #include "drivers/link/line_codec.h"
-#include "drivers/mapped_drive.h"
 #include "drivers/obis_codec.h"
-#include "drivers/oriental_az.h"
 
 namespace hilbrush {
 

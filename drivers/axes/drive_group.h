@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/axis_drive.h"
+#include "drivers/axes/axis_drive.h"
 #include "drivers/axis_group.h"
 #include "drivers/clock.h"
 #include "drivers/deadline_mutex.h"

@@ -1,4 +1,4 @@
-#include "drivers/drive_group.h"
+#include "drivers/axes/drive_group.h"
 
 #include <algorithm>
 #include <chrono>

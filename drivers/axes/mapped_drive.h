@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "drivers/axis_drive.h"
+#include "drivers/axes/axis_drive.h"
+#include "drivers/axes/modbus_bus.h"
 #include "drivers/clock.h"
 #include "drivers/device_options.h"
-#include "drivers/modbus_bus.h"
 
 namespace hilbrush {
 

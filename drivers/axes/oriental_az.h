@@ -6,9 +6,9 @@
 #include <span>
 #include <string>
 
-#include "drivers/axis_drive.h"
+#include "drivers/axes/axis_drive.h"
+#include "drivers/axes/modbus_bus.h"
 #include "drivers/device_options.h"
-#include "drivers/modbus_bus.h"
 
 /// Oriental Motor AZ drives by "direct data operation": one write of 16 registers carries target, speed, rates and the
 /// trigger that starts the move; or one write carries them with the trigger at 0, and a second, of the trigger alone,

@@ -1,4 +1,4 @@
-#include "drivers/mapped_drive.h"
+#include "drivers/axes/mapped_drive.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "drivers/modbus_bus.h"
+#include "drivers/axes/modbus_bus.h"
 
 #include <fcntl.h>
 #include <modbus.h>

@@ -1,4 +1,4 @@
-#include "drivers/oriental_az.h"
+#include "drivers/axes/oriental_az.h"
 
 #include <chrono>
 #include <cstdio>
