@@ -14,10 +14,10 @@
 #include <memory>
 #include <string_view>
 
-#include "drivers/cobolt_head.h"
 #include "drivers/guard_process.h"
 #include "drivers/guard_server.h"
-#include "drivers/obis_head.h"
+#include "drivers/laser/cobolt_head.h"
+#include "drivers/laser/obis_head.h"
 #include "drivers/steady_clock.h"
 
 namespace {

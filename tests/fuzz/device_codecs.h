@@ -7,12 +7,12 @@
 
 #include "drivers/axes/mapped_drive.h"
 #include "drivers/axes/oriental_az.h"
-#include "drivers/cobolt_codec.h"
 #include "drivers/dobot/dobot_codec.h"
 #include "drivers/guard_codec.h"
 #include "drivers/guard_process.h"
+#include "drivers/laser/cobolt_codec.h"
+#include "drivers/laser/obis_codec.h"
 #include "drivers/link/line_codec.h"
-#include "drivers/obis_codec.h"
 
 namespace hilbrush {
 

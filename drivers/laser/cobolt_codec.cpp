@@ -1,4 +1,4 @@
-#include "drivers/cobolt_codec.h"
+#include "drivers/laser/cobolt_codec.h"
 
 #include <cstdio>
 

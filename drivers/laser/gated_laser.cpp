@@ -1,4 +1,4 @@
-#include "drivers/gated_laser.h"
+#include "drivers/laser/gated_laser.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "drivers/obis_codec.h"
+#include "drivers/laser/obis_codec.h"
 
 #include <charconv>
 #include <cstdio>

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "drivers/cobolt_codec.h"
 #include "drivers/guard_codec.h"
+#include "drivers/laser/cobolt_codec.h"
+#include "drivers/laser/obis_codec.h"
 #include "drivers/link/line_codec.h"
-#include "drivers/obis_codec.h"
 
 namespace hilbrush {
 namespace {

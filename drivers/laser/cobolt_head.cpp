@@ -1,12 +1,12 @@
-#include "drivers/cobolt_head.h"
+#include "drivers/laser/cobolt_head.h"
 
 #include <sys/prctl.h>
 
 #include <cmath>
 #include <cstdio>
 
-#include "drivers/cobolt_codec.h"
 #include "drivers/driver_error.h"
+#include "drivers/laser/cobolt_codec.h"
 #include "drivers/link/line_codec.h"
 
 namespace hilbrush {

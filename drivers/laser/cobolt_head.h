@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "drivers/gate.h"
-#include "drivers/line_laser.h"
+#include "drivers/laser/line_laser.h"
 
 namespace hilbrush {
 

@@ -1,4 +1,4 @@
-#include "drivers/line_laser.h"
+#include "drivers/laser/line_laser.h"
 
 #include <cmath>
 #include <cstdio>

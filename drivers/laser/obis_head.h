@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/line_laser.h"
+#include "drivers/laser/line_laser.h"
 
 namespace hilbrush {
 

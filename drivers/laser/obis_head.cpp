@@ -1,10 +1,10 @@
-#include "drivers/obis_head.h"
+#include "drivers/laser/obis_head.h"
 
 #include <cstdio>
 #include <optional>
 
 #include "drivers/driver_error.h"
-#include "drivers/obis_codec.h"
+#include "drivers/laser/obis_codec.h"
 
 namespace hilbrush {
 
