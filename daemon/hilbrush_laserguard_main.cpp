@@ -1,5 +1,5 @@
 // hilbrush-laserguard: owns a laser's link, so that the laser is turned off whatever happens to the process that uses
-// it. See drivers/guard_server.h. Started by hilbrushd, never by hand: its user's channel is descriptor 3.
+// it. See drivers/guard/guard_server.h. Started by hilbrushd, never by hand: its user's channel is descriptor 3.
 
 #include <sched.h>
 #include <signal.h>
@@ -14,8 +14,8 @@
 #include <memory>
 #include <string_view>
 
-#include "drivers/guard_process.h"
-#include "drivers/guard_server.h"
+#include "drivers/guard/guard_process.h"
+#include "drivers/guard/guard_server.h"
 #include "drivers/laser/cobolt_head.h"
 #include "drivers/laser/obis_head.h"
 #include "drivers/steady_clock.h"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "drivers/guard_codec.h"
+#include "drivers/guard/guard_codec.h"
 #include "drivers/laser/cobolt_codec.h"
 #include "drivers/laser/obis_codec.h"
 #include "drivers/link/line_codec.h"

@@ -9,7 +9,7 @@
 
 #include "drivers/clock.h"
 #include "drivers/gate.h"
-#include "drivers/guard_codec.h"
+#include "drivers/guard/guard_codec.h"
 #include "drivers/laser_head.h"
 #include "drivers/link/link.h"
 

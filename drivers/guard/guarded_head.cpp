@@ -1,4 +1,4 @@
-#include "drivers/guarded_head.h"
+#include "drivers/guard/guarded_head.h"
 
 #include <poll.h>
 #include <pthread.h>

@@ -1,4 +1,4 @@
-#include "drivers/guard_process.h"
+#include "drivers/guard/guard_process.h"
 
 #include <fcntl.h>
 #include <spawn.h>

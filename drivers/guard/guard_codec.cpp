@@ -1,4 +1,4 @@
-#include "drivers/guard_codec.h"
+#include "drivers/guard/guard_codec.h"
 
 #include <array>
 #include <charconv>

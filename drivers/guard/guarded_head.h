@@ -10,7 +10,7 @@
 
 #include "drivers/clock.h"
 #include "drivers/gate.h"
-#include "drivers/guard_codec.h"
+#include "drivers/guard/guard_codec.h"
 #include "drivers/laser_head.h"
 
 namespace hilbrush {

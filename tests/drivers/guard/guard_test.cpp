@@ -15,9 +15,9 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/guard_codec.h"
-#include "drivers/guard_process.h"
-#include "drivers/guarded_head.h"
+#include "drivers/guard/guard_codec.h"
+#include "drivers/guard/guard_process.h"
+#include "drivers/guard/guarded_head.h"
 #include "tests/drivers/wired_cell.h"
 
 /// hilbrush-laserguard as a process, in front of a simulated laser that says by itself whether it can emit.

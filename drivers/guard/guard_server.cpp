@@ -1,4 +1,4 @@
-#include "drivers/guard_server.h"
+#include "drivers/guard/guard_server.h"
 
 #include <poll.h>
 #include <sys/socket.h>
