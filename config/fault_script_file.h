@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <string>
 
-#include "sim/wire/fault_script.h"
+#include "sim/script/fault_script.h"
 
 /// Fault scripts of the simulated cell on wires, from JSON, read strictly (see json_reader.h):
 ///

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "sim/wire/endpoints.h"
+#include "sim/script/endpoints.h"
 
 namespace hilbrush {
 

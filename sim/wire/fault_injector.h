@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "sim/wire/fault_script.h"
+#include "sim/script/fault_script.h"
 #include "sim/wire/true_cell.h"
 
 /// Makes a fault script happen: told of every message and of time, it says what becomes of an exchange, and acts on the

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "sim/wire/fault_script.h"
+#include "sim/script/fault_script.h"
 
 /// Whose time a dot takes: the devices' own, or what their controller adds. A device's own time ends with the first
 /// frame or reply that shows it at rest and settled (or, after a pulse, dark); what passes from there until it is told

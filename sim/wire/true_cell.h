@@ -7,7 +7,7 @@
 #include "planner/cell_model/cell_description.h"
 #include "sim/devices/axis_motion.h"
 #include "sim/devices/emission_record.h"
-#include "sim/wire/cell_phase.h"
+#include "sim/script/cell_phase.h"
 
 /// What the simulated cell truly is behind all its wires: six axes, one laser head with its gate, an interlock, and the
 /// record of emissions. Everything happens at a time that the caller gives, so the same cell runs on a scaled clock or

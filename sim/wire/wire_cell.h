@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "sim/wire/endpoints.h"
+#include "sim/script/endpoints.h"
 #include "sim/wire/time_record.h"
 #include "sim/wire/true_cell.h"
 #include "sim/wire/wire_options.h"

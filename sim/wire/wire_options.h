@@ -1,5 +1,5 @@
 #pragma once
-#include "sim/wire/fault_script.h"
+#include "sim/script/fault_script.h"
 
 namespace hilbrush {
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "planner/cell_model/cell_description.h"
-#include "sim/wire/fault_script.h"
+#include "sim/script/fault_script.h"
 
 namespace hilbrush::test {
 

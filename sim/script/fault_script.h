@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "sim/wire/cell_phase.h"
+#include "sim/script/cell_phase.h"
 
 /// What shall go wrong in a simulated cell, and when. Data only: config/fault_script_file reads it from JSON,
 /// sim/wire/fault_injector makes it happen.
