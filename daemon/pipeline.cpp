@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "config/cell_file.h"
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 #include "daemon/job_sampling.h"
 #include "daemon/output_files.h"
 #include "daemon/painted_dots.h"

@@ -12,7 +12,7 @@
 #include "daemon/commands/interrupt.h"
 #include "daemon/commands/pipeline_run.h"
 #include "daemon/commands/rpc_client.h"
-#include "daemon/server/cell_devices.h"
+#include "daemon/execution/cell_devices.h"
 #include "drivers/driver_error.h"
 #include "sampling/base/input_error.h"
 

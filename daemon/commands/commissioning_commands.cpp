@@ -13,7 +13,7 @@
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
 #include "daemon/commands/interrupt.h"
-#include "daemon/server/cell_devices.h"
+#include "daemon/execution/cell_devices.h"
 #include "drivers/driver_error.h"
 #include "sampling/base/angles.h"
 

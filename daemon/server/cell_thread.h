@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/executor.h"
-#include "daemon/journal.h"
-#include "daemon/server/cell_devices.h"
+#include "daemon/execution/cell_devices.h"
+#include "daemon/execution/executor.h"
+#include "daemon/execution/journal.h"
 
 /// The executor's thread: the only one that commands motion. Orders come from the socket thread through a queue of at
 /// most kQueueMax; answers go back as closures posted to the socket thread. Stops overtake everything: they have a

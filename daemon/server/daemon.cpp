@@ -4,10 +4,10 @@
 #include <stdexcept>
 
 #include "config/cell_file.h"
+#include "daemon/execution/cell_devices.h"
 #include "daemon/server/access.h"
 #include "daemon/server/audit_log.h"
 #include "daemon/server/cell_desk.h"
-#include "daemon/server/cell_devices.h"
 #include "daemon/server/cell_thread.h"
 #include "daemon/server/job_book.h"
 #include "daemon/server/job_store.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/duration_histogram.h"
-#include "daemon/motion_times.h"
+#include "daemon/execution/duration_histogram.h"
+#include "daemon/execution/motion_times.h"
 
 /// A job as the daemon remembers and tells it. Plain data; the socket thread owns it.
 namespace hilbrush {

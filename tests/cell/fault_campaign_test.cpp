@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 #include "drivers/driver_error.h"
 #include "tests/cell/fault_plan.h"
 #include "tests/cell/virtual_cell.h"

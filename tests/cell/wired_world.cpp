@@ -12,7 +12,7 @@
 #include "config/wired_cell_file.h"
 #include "drivers/driver_error.h"
 #include "sim/devices/sim_cell.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 namespace hilbrush::test {
 namespace {

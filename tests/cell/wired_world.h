@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/executor.h"
-#include "daemon/server/cell_devices.h"
+#include "daemon/execution/cell_devices.h"
+#include "daemon/execution/executor.h"
 #include "sim/wire/wire_cell.h"
 #include "tests/support/temporary_folder.h"
 

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/journal.h"
+#include "daemon/execution/journal.h"
 #include "planner/cell_model/exposure_program.h"
 #include "sim/devices/emission_record.h"
 

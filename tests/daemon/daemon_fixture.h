@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "daemon/server/daemon.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 /// A daemon in this process on a socket of its own, clients that talk to it as anybody would, and a shell script in the
 /// pipeline's place, which answers by the model's name.

@@ -6,7 +6,7 @@
 
 #include "config/rpc_errors.h"
 #include "tests/daemon/daemon_fixture.h"
-#include "tests/daemon/sim_devices.h"
+#include "tests/daemon/execution/sim_devices.h"
 
 /// Acts that take long, stops that overtake them, and devices that answer late: nobody else waits.
 namespace hilbrush {

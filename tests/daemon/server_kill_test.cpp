@@ -18,7 +18,7 @@
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/daemon_process.h"
-#include "tests/daemon/witnessed_cell.h"
+#include "tests/daemon/execution/witnessed_cell.h"
 
 namespace hilbrush {
 namespace {

@@ -11,7 +11,7 @@
 #include "daemon/server/job_store.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
-#include "tests/daemon/sim_devices.h"
+#include "tests/daemon/execution/sim_devices.h"
 
 /// Order, copies and what survives when files do not.
 namespace hilbrush {

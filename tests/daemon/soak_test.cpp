@@ -9,7 +9,7 @@
 #include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"
-#include "tests/daemon/sim_devices.h"
+#include "tests/daemon/execution/sim_devices.h"
 #include "tests/daemon/soak_support.h"
 
 /// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients

@@ -12,7 +12,7 @@
 #include "drivers/laser/obis_head.h"
 #include "drivers/steady_clock.h"
 #include "sim/wire/wire_cell.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 /// The drivers at one end of real wires, a simulated cell at the other, on clocks of the same scale.
 namespace hilbrush::test {

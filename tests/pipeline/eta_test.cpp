@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/cell_file.h"
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 #include "planner/plan.h"
 #include "sim/devices/sim_cell.h"
 #include "tests/pipeline/painting.h"

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "config/cell_file.h"
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 #include "daemon/pipeline.h"
 #include "planner/cell_model/program_file.h"
 #include "planner/check/check_cell.h"

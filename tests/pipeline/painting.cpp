@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "config/cell_file.h"
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 #include "daemon/pipeline.h"
 #include "planner/cell_model/program_file.h"
 #include "sampling/images/image_file.h"

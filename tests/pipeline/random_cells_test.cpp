@@ -7,7 +7,7 @@
 #include <ctime>
 #include <map>
 
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 #include "daemon/painted_dots.h"
 #include "planner/check/check_cell.h"
 #include "planner/check/program_check.h"

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "planner/cell_model/time_model.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 namespace hilbrush {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sim/wire/wired_devices.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 /// The wired devices under virtual time: a test says what bytes arrive and how much time passes.
 namespace hilbrush::test {

@@ -1,4 +1,4 @@
-#include "daemon/server/cell_devices.h"
+#include "daemon/execution/cell_devices.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

@@ -7,10 +7,10 @@
 #include <mutex>
 #include <vector>
 
-#include "daemon/executor.h"
-#include "daemon/journal.h"
+#include "daemon/execution/executor.h"
+#include "daemon/execution/journal.h"
 #include "sim/devices/sim_cell.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 /// The safety invariants as a witness sees them: what the simulated laser really emitted against what the journal says.
 namespace hilbrush::test {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/duration_histogram.h"
-#include "daemon/journal.h"
-#include "daemon/motion_times.h"
+#include "daemon/execution/duration_histogram.h"
+#include "daemon/execution/journal.h"
+#include "daemon/execution/motion_times.h"
 #include "drivers/cell.h"
 #include "planner/cell_model/exposure_program.h"
 

@@ -1,4 +1,4 @@
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "sim/devices/sim_cell.h"
-#include "tests/daemon/witnessed_cell.h"
+#include "tests/daemon/execution/witnessed_cell.h"
 
 namespace hilbrush {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/journal.h"
+#include "daemon/execution/journal.h"
 
 #include <algorithm>
 #include <cstring>

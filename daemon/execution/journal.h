@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/journal_storage.h"
+#include "daemon/execution/journal_storage.h"
 
 /// Which exposures are done: the memory of a painting job that must survive everything (no dot is exposed twice).
 ///

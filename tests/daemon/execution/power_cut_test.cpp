@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/executor.h"
-#include "daemon/journal.h"
+#include "daemon/execution/executor.h"
+#include "daemon/execution/journal.h"
 #include "sim/devices/sim_cell.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 /// The journal on a disk whose power may be cut at any write, and which may then have kept any part of what was not
 /// synced; and on one that is full or broken.

@@ -1,4 +1,4 @@
-#include "daemon/journal.h"
+#include "daemon/execution/journal.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "sampling/base/check.h"
-#include "tests/daemon/program_fixture.h"
+#include "tests/daemon/execution/program_fixture.h"
 
 namespace hilbrush {
 namespace {

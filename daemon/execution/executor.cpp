@@ -1,4 +1,4 @@
-#include "daemon/executor.h"
+#include "daemon/execution/executor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "daemon/program_limits.h"
+#include "daemon/execution/program_limits.h"
 #include "drivers/driver_error.h"
 #include "planner/cell_model/time_model.h"
 

@@ -1,4 +1,4 @@
-#include "daemon/journal_storage.h"
+#include "daemon/execution/journal_storage.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

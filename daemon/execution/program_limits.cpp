@@ -1,4 +1,4 @@
-#include "daemon/program_limits.h"
+#include "daemon/execution/program_limits.h"
 
 #include <algorithm>
 #include <cmath>

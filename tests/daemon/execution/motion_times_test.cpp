@@ -1,4 +1,4 @@
-#include "daemon/motion_times.h"
+#include "daemon/execution/motion_times.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <filesystem>
 
-#include "daemon/server/cell_devices.h"
+#include "daemon/execution/cell_devices.h"
 #include "sim/devices/emission_keeper.h"
 #include "sim/devices/sim_cell.h"
 

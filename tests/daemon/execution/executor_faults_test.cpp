@@ -6,8 +6,8 @@
 #include <random>
 #include <utility>
 
-#include "tests/daemon/faulty_cell.h"
-#include "tests/daemon/witnessed_cell.h"
+#include "tests/daemon/execution/faulty_cell.h"
+#include "tests/daemon/execution/witnessed_cell.h"
 
 /// Everything that can go wrong, at every place and at every phase of a dot, under virtual time.
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "daemon/duration_histogram.h"
+#include "daemon/execution/duration_histogram.h"
 
 #include <algorithm>
 #include <cmath>
