@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "config/cell_file.h"
-#include "daemon/pipeline.h"
+#include "daemon/pipeline/pipeline.h"
 #include "drivers/driver_error.h"
 #include "planner/cell_model/program_file.h"
 #include "sampling/images/image_file.h"

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "config/cell_file.h"
-#include "daemon/pipeline.h"
+#include "daemon/pipeline/pipeline.h"
 #include "planner/cell_model/program_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/model_file.h"

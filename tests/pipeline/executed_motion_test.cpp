@@ -2,7 +2,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/execution/executor.h"
-#include "daemon/pipeline.h"
+#include "daemon/pipeline/pipeline.h"
 #include "planner/cell_model/program_file.h"
 #include "planner/check/check_cell.h"
 #include "sampling/images/image_file.h"

@@ -1,4 +1,4 @@
-#include "daemon/painted_dots.h"
+#include "daemon/pipeline/painted_dots.h"
 
 #include <gtest/gtest.h>
 

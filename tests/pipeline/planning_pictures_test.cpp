@@ -1,4 +1,4 @@
-#include "daemon/planning_pictures.h"
+#include "daemon/pipeline/planning_pictures.h"
 
 #include <gtest/gtest.h>
 

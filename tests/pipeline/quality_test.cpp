@@ -1,4 +1,4 @@
-#include "daemon/quality/quality.h"
+#include "daemon/pipeline/quality/quality.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "daemon/execution/executor.h"
-#include "daemon/painted_dots.h"
+#include "daemon/pipeline/painted_dots.h"
 #include "planner/check/check_cell.h"
 #include "planner/check/program_check.h"
 #include "planner/plan.h"

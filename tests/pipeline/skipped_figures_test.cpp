@@ -1,4 +1,4 @@
-#include "daemon/skipped_figures.h"
+#include "daemon/pipeline/skipped_figures.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/cell_file.h"
-#include "daemon/pipeline.h"
+#include "daemon/pipeline/pipeline.h"
 #include "sampling/base/input_error.h"
 #include "tests/pipeline/painting.h"
 #include "tests/pipeline/report_expectations.h"

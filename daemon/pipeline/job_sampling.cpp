@@ -1,4 +1,4 @@
-#include "daemon/job_sampling.h"
+#include "daemon/pipeline/job_sampling.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,13 +1,13 @@
-#include "daemon/quality/quality.h"
+#include "daemon/pipeline/quality/quality.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "config/json_reader.h"
-#include "daemon/output_files.h"
-#include "daemon/quality/figures.h"
-#include "daemon/quality/measured_set.h"
-#include "daemon/quality/plots.h"
+#include "daemon/pipeline/output_files.h"
+#include "daemon/pipeline/quality/figures.h"
+#include "daemon/pipeline/quality/measured_set.h"
+#include "daemon/pipeline/quality/plots.h"
 #include "sampling/base/input_error.h"
 
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "daemon/output_files.h"
+#include "daemon/pipeline/output_files.h"
 
 #include <fstream>
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/pipeline.h"
+#include "daemon/pipeline/pipeline.h"
 
 /// `hilbrush quality`: places dots on a named surface or a model, or takes those of a dry run, and says how good they
 /// are, in figures (JSON) and plots (SVG).

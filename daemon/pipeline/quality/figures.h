@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/quality/measured_set.h"
+#include "daemon/pipeline/quality/measured_set.h"
 
 /// The figures of one set of dots, as values and as JSON.
 namespace hilbrush {

@@ -1,4 +1,4 @@
-#include "daemon/pipeline.h"
+#include "daemon/pipeline/pipeline.h"
 
 #include <algorithm>
 #include <chrono>
@@ -14,11 +14,11 @@
 
 #include "config/cell_file.h"
 #include "daemon/execution/executor.h"
-#include "daemon/job_sampling.h"
-#include "daemon/output_files.h"
-#include "daemon/painted_dots.h"
-#include "daemon/planning_pictures.h"
-#include "daemon/report.h"
+#include "daemon/pipeline/job_sampling.h"
+#include "daemon/pipeline/output_files.h"
+#include "daemon/pipeline/painted_dots.h"
+#include "daemon/pipeline/planning_pictures.h"
+#include "daemon/pipeline/report.h"
 #include "planner/cell_model/program_file.h"
 #include "planner/check/program_check.h"
 #include "planner/mounting.h"

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/quality/figures.h"
+#include "daemon/pipeline/quality/figures.h"
 
 namespace hilbrush {
 

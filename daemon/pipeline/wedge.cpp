@@ -1,4 +1,4 @@
-#include "daemon/wedge.h"
+#include "daemon/pipeline/wedge.h"
 
 #include <algorithm>
 #include <array>

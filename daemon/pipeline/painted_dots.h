@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <span>
 
-#include "daemon/report.h"
+#include "daemon/pipeline/report.h"
 #include "planner/cell_model/exposure_program.h"
 #include "sim/devices/emission_record.h"
 #include "sim/film/film.h"

@@ -2,7 +2,7 @@
 #include <array>
 
 #include "config/job_settings.h"
-#include "daemon/quality/measured_set.h"
+#include "daemon/pipeline/quality/measured_set.h"
 #include "sampling/base/input_error.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/parametric/point_sets.h"

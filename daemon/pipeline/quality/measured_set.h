@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/quality/quality.h"
+#include "daemon/pipeline/quality/quality.h"
 #include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots.h"
 #include "sampling/parametric/parametric.h"

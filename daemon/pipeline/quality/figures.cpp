@@ -1,4 +1,4 @@
-#include "daemon/quality/figures.h"
+#include "daemon/pipeline/quality/figures.h"
 
 #include <nlohmann/json.hpp>
 

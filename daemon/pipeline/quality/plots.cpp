@@ -1,4 +1,4 @@
-#include "daemon/quality/plots.h"
+#include "daemon/pipeline/quality/plots.h"
 
 #include <algorithm>
 #include <cmath>

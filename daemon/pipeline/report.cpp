@@ -1,4 +1,4 @@
-#include "daemon/report.h"
+#include "daemon/pipeline/report.h"
 
 #include <sys/resource.h>
 

@@ -3,11 +3,11 @@
 #include <string>
 
 #include "config/cell_file.h"
-#include "daemon/job_sampling.h"
-#include "daemon/output_files.h"
-#include "daemon/pipeline.h"
-#include "daemon/report.h"
-#include "daemon/wedge.h"
+#include "daemon/pipeline/job_sampling.h"
+#include "daemon/pipeline/output_files.h"
+#include "daemon/pipeline/pipeline.h"
+#include "daemon/pipeline/report.h"
+#include "daemon/pipeline/wedge.h"
 #include "sampling/base/input_error.h"
 #include "sampling/tone/levels.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/skipped_figures.h"
+#include "daemon/pipeline/skipped_figures.h"
 #include "planner/mounting_advice.h"
 #include "planner/plan.h"
 #include "sampling/model/mesh_repair.h"

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "config/cell_file.h"
-#include "daemon/pipeline.h"
-#include "daemon/quality/quality.h"
+#include "daemon/pipeline/pipeline.h"
+#include "daemon/pipeline/quality/quality.h"
 #include "planner/cell_model/program_file.h"
 #include "sampling/base/input_error.h"
 
