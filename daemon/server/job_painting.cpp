@@ -2,7 +2,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "daemon/server/job_book.h"
+#include "daemon/server/job_queue.h"
 
 /// The part of JobBook that paints: prepare (program and journal are read), approach (the way is planned by a child),
 /// paint, and what becomes of the job afterwards. One job at a time.

@@ -1,6 +1,6 @@
 #include <filesystem>
 
-#include "daemon/server/job_book.h"
+#include "daemon/server/job_queue.h"
 #include "daemon/server/model_copy.h"
 #include "sampling/base/input_error.h"
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "daemon/server/audit_log.h"
-#include "daemon/server/cell_desk.h"
-#include "daemon/server/job_book.h"
+#include "daemon/server/cell_controller.h"
+#include "daemon/server/job_queue.h"
 #include "daemon/server/json_rpc.h"
 
 /// Every method of the socket in one table: its name, what it does, the schemas of its parameters and result, and its

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "config/rpc_errors.h"
-#include "daemon/server/job_book.h"
+#include "daemon/server/job_queue.h"
 #include "daemon/server/job_store.h"
 #include "sim/devices/emission_record.h"
 #include "tests/daemon/daemon_fixture.h"

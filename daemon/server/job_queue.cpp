@@ -1,4 +1,4 @@
-#include "daemon/server/job_book.h"
+#include "daemon/server/job_queue.h"
 
 #include <algorithm>
 #include <fstream>

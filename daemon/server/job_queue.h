@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/server/cell_desk.h"
+#include "daemon/server/cell_controller.h"
 #include "daemon/server/cell_thread.h"
 #include "daemon/server/job.h"
 #include "daemon/server/job_store.h"

@@ -1,4 +1,4 @@
-#include "daemon/server/cell_desk.h"
+#include "daemon/server/cell_controller.h"
 
 #include <numbers>
 
