@@ -13,7 +13,7 @@
 #include "sampling/base/angles.h"
 #include "sim/devices/emission_record.h"
 #include "tests/cell/wired_world.h"
-#include "tests/daemon/daemon_process.h"
+#include "tests/daemon/server/daemon_process.h"
 #include "tests/support/shell.h"
 
 /// `hilbrush check-cell` and `hilbrush jog`, as processes, against simulated devices on wires: hilbrush-simcell as a

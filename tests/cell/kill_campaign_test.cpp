@@ -10,7 +10,7 @@
 #include "planner/cell_model/program_file.h"
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"
-#include "tests/daemon/daemon_process.h"
+#include "tests/daemon/server/daemon_process.h"
 
 /// hilbrushd killed with SIGKILL at random moments of a job over the wire, begun again, and the job resumed: by the
 /// emissions' record no dot is lit twice, none is lost, and each kill leaves at most one in doubt. HILBRUSH_LONG: 200

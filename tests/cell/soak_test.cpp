@@ -8,7 +8,7 @@
 #include "tests/cell/fault_plan.h"
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"
-#include "tests/daemon/soak_support.h"
+#include "tests/daemon/server/soak_support.h"
 
 /// The daemon with its real drivers on wires, for long: jobs, faults of every kind, connections that are lost and made
 /// again, stops, the daemon's own restarts, clients that mean no good. HILBRUSH_LONG=1 makes it an hour,

@@ -5,8 +5,8 @@
 #include <mutex>
 
 #include "config/rpc_errors.h"
-#include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/execution/sim_devices.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 /// Acts that take long, stops that overtake them, and devices that answer late: nobody else waits.
 namespace hilbrush {

@@ -10,8 +10,8 @@
 #include "daemon/server/job_queue.h"
 #include "daemon/server/job_store.h"
 #include "sim/devices/emission_record.h"
-#include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/execution/sim_devices.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 /// Order, copies and what survives when files do not.
 namespace hilbrush {

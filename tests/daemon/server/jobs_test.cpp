@@ -13,7 +13,7 @@
 #include "config/rpc_errors.h"
 #include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 namespace hilbrush {
 namespace {

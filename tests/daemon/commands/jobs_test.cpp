@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/commands/exit_code.h"
-#include "tests/daemon/commands_support.h"
+#include "tests/daemon/commands/command_runs.h"
 
 /// Job and cell commands against a daemon that follows a script.
 namespace hilbrush {

@@ -8,9 +8,9 @@
 
 #include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
-#include "tests/daemon/daemon_fixture.h"
 #include "tests/daemon/execution/sim_devices.h"
-#include "tests/daemon/soak_support.h"
+#include "tests/daemon/server/daemon_fixture.h"
+#include "tests/daemon/server/soak_support.h"
 
 /// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients
 /// that come, talk nonsense and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N so many seconds.

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "config/rpc_errors.h"
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 /// Requests made after the daemon's own schemas, right and wrong in every way that these allow, and damaged in transit.
 /// rpc_fuzzer.cpp looks for what the schemas do not know.

@@ -11,7 +11,7 @@
 #include "config/rpc_errors.h"
 #include "sampling/base/input_error.h"
 #include "sampling/base/sha256.h"
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 namespace hilbrush {
 namespace {

@@ -11,7 +11,7 @@
 #include "config/job_settings.h"
 #include "config/json_reader.h"
 #include "daemon/commands/exit_code.h"
-#include "tests/daemon/commands_support.h"
+#include "tests/daemon/commands/command_runs.h"
 
 /// dry-run, plan, develop and calibrate against a child that follows a script instead of hilbrush-pipeline.
 namespace hilbrush {

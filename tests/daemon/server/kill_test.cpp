@@ -16,9 +16,9 @@
 
 #include "planner/cell_model/program_file.h"
 #include "sim/devices/emission_record.h"
-#include "tests/daemon/daemon_fixture.h"
-#include "tests/daemon/daemon_process.h"
 #include "tests/daemon/execution/witnessed_cell.h"
+#include "tests/daemon/server/daemon_fixture.h"
+#include "tests/daemon/server/daemon_process.h"
 
 namespace hilbrush {
 namespace {

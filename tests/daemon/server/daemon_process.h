@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 extern char** environ;
 

@@ -1,4 +1,4 @@
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

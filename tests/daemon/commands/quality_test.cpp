@@ -7,7 +7,7 @@
 
 #include "config/json_reader.h"
 #include "daemon/commands/exit_code.h"
-#include "tests/daemon/commands_support.h"
+#include "tests/daemon/commands/command_runs.h"
 
 /// hilbrush quality against a child that follows a script instead of hilbrush-pipeline.
 namespace hilbrush {

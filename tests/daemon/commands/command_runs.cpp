@@ -1,4 +1,4 @@
-#include "tests/daemon/commands_support.h"
+#include "tests/daemon/commands/command_runs.h"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>

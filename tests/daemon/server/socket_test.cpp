@@ -8,7 +8,7 @@
 #include <set>
 
 #include "config/rpc_errors.h"
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 namespace hilbrush {
 namespace {

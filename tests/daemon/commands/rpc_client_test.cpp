@@ -1,10 +1,11 @@
+#include "daemon/commands/rpc_client.h"
+
 #include <gtest/gtest.h>
 
 #include <future>
 
 #include "config/rpc_errors.h"
-#include "daemon/commands/rpc_client.h"
-#include "tests/daemon/commands_support.h"
+#include "tests/daemon/commands/command_runs.h"
 
 namespace hilbrush {
 namespace {

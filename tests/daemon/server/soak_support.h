@@ -16,7 +16,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/daemon/daemon_fixture.h"
+#include "tests/daemon/server/daemon_fixture.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 // Of the sanitizers' allocator; the compiler brings the function, but no header that declares it.

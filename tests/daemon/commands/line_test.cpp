@@ -5,7 +5,7 @@
 
 #include "config/cell_file.h"
 #include "daemon/commands/exit_code.h"
-#include "tests/daemon/commands_support.h"
+#include "tests/daemon/commands/command_runs.h"
 
 /// Parsing, help, exit codes and check-config: everything of the command that needs neither daemon nor pipeline.
 namespace hilbrush {
