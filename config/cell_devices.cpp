@@ -23,7 +23,7 @@ AxisBounds bounds_of(const AxisDescription& axis) {
   return {axis.min, axis.max, axis.speed_max, axis.acceleration_max};
 }
 
-/// sign and offset; steps_per_unit as given, or 1 device unit (degree or millimetre) if `has_steps` is false.
+/// sign and offset; steps_per_unit as given, or 1 device unit (degree or millimeter) if `has_steps` is false.
 AxisScale read_scale(JsonObject& json, int axis, bool has_steps) {
   const char* unit = is_prismatic(axis) ? "mm" : "deg";
   const double unit_si = is_prismatic(axis) ? 1e-3 : kDegree;

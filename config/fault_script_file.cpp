@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kFaultsMax = 10'000;
 constexpr std::size_t kScriptBytesMax = 4u << 20;
-constexpr double kLongestS = 86'400;
+constexpr double kMaxS = 86'400;
 constexpr std::uint64_t kCountMax = 1'000'000'000;
 
 template <std::size_t N>
@@ -21,13 +21,13 @@ std::vector<std::string> names(const std::array<const char*, N>& table) {
 
 void read_trigger(JsonObject& json, WireFault& fault) {
   FaultTrigger& trigger = fault.trigger;
-  if (json.has("at_s")) trigger.at_s = json.quantity("at_s", {0, kLongestS});
+  if (json.has("at_s")) trigger.at_s = json.quantity("at_s", {0, kMaxS});
   if (is_of_exchange(fault.kind) || json.has("device"))
     trigger.at_message = json.optional_integer("at_message", 1, kCountMax);
   if (const auto phase = json.optional_choice("phase", names(kCellPhaseNames))) {
     trigger.phase = static_cast<CellPhase>(*phase);
     trigger.occurrence = json.optional_integer("occurrence", 1, kCountMax).value_or(1);
-    if (json.has("delay_ms")) trigger.delay_s = json.quantity("delay_ms", {0, kLongestS * 1e3});
+    if (json.has("delay_ms")) trigger.delay_s = json.quantity("delay_ms", {0, kMaxS * 1e3});
   }
   if (!trigger.at_s && !trigger.at_message && !trigger.phase)
     json.refuse("kind", "has no trigger: give at_s, at_message (with device) or phase");
@@ -52,7 +52,7 @@ WireFault read_fault(JsonObject& json) {
   if (fault.kind == WireFaultKind::kDeviceAlarm && fault.device == WireDevice::kLaser)
     json.refuse("device", "has no alarm of its own: use interlock_open");
   if (is_of_exchange(fault.kind)) fault.messages = json.optional_integer("messages", 1, kCountMax).value_or(1);
-  if (has_duration(fault.kind)) fault.duration_s = json.quantity("duration_ms", {0, kLongestS * 1e3});
+  if (has_duration(fault.kind)) fault.duration_s = json.quantity("duration_ms", {0, kMaxS * 1e3});
   if (has_axis(fault.kind)) fault.axis = static_cast<int>(json.choice("axis", names(kAxisNames)));
   if (fault.kind == WireFaultKind::kAxisDrift)
     fault.amount = json.quantity(fault.axis == kJ3 ? "speed_mm_s" : "speed_deg_s", {-1e5, 1e5});

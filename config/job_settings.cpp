@@ -11,7 +11,7 @@ namespace hilbrush {
 namespace {
 
 constexpr double kDefaultDpi = 100;
-constexpr double kMetresPerInch = 0.0254;
+constexpr double kMetersPerInch = 0.0254;
 constexpr std::uint64_t kDotsMax = 1'000'000'000;  // what memory allows is found by the pipeline
 constexpr std::uint64_t kLevelsMax = 4;
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
@@ -199,7 +199,7 @@ const char* untextured_name(Untextured untextured) {
 SampleOptions sample_options(const JobSettings& settings) {
   SampleOptions options;
   options.dot_count = settings.dots;
-  if (!settings.dots) options.pitch_m = kMetresPerInch / settings.dpi.value_or(kDefaultDpi);
+  if (!settings.dots) options.pitch_m = kMetersPerInch / settings.dpi.value_or(kDefaultDpi);
   options.sampler = settings.sampler;
   options.seed = settings.seed;
   options.dot_limit = kDotsMax;
@@ -215,13 +215,13 @@ PlanOptions plan_options(const JobSettings& settings) {
 }
 
 MountingOptions mounting_options(const JobSettings& settings) {
-  const auto metres = [](const std::optional<double>& length_mm) {
+  const auto meters = [](const std::optional<double>& length_mm) {
     return length_mm ? std::optional<double>(*length_mm * 1e-3) : std::nullopt;
   };
   const auto& offset_mm = settings.mounting.offset_mm;
-  return {.post_height_m = metres(settings.fixture.post_height_mm),
-          .post_radius_m = metres(settings.fixture.post_radius_mm),
-          .plate_radius_m = metres(settings.fixture.plate_radius_mm),
+  return {.post_height_m = meters(settings.fixture.post_height_mm),
+          .post_radius_m = meters(settings.fixture.post_radius_mm),
+          .plate_radius_m = meters(settings.fixture.plate_radius_mm),
           .offset_m = {offset_mm[0] * 1e-3, offset_mm[1] * 1e-3, offset_mm[2] * 1e-3},
           .turn = settings.mounting.turn_deg * kDegree};
 }

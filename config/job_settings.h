@@ -34,7 +34,7 @@ struct JobSettings {
   std::optional<double> dpi;          ///< dots per 25.4 mm of full tone; or
   std::optional<std::uint64_t> dots;  ///< exactly so many
   std::optional<double> size_mm;      ///< scale the longest side to this; or
-  std::optional<double> units_mm;     ///< millimetres of one unit of the file
+  std::optional<double> units_mm;     ///< millimeters of one unit of the file
   std::optional<std::string> up;      ///< "y" or "z"
   Untextured untextured = Untextured::kAuto;
   Sampler sampler = Sampler::kCentroid;

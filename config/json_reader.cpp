@@ -185,8 +185,8 @@ std::string stem(const std::string& key) {
 }  // namespace
 
 std::optional<std::string> nearest_word(const std::string& word, const std::vector<std::string>& words) {
-  constexpr std::size_t kLongest = 64;
-  if (word.size() > kLongest) return std::nullopt;
+  constexpr std::size_t kMax = 64;
+  if (word.size() > kMax) return std::nullopt;
   std::optional<std::string> nearest;
   std::size_t least = 1 + std::min<std::size_t>(2, (word.size() + 1) / 3);  // fewer changes than this
   for (const std::string& candidate : words) {

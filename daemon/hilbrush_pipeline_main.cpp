@@ -132,7 +132,7 @@ int main(int argc, char** argv) {
   CLI::App* develop = add("develop", "develop what a simulated cell recorded", true, true);
   develop->add_option("--program", arguments.program, "program file")->required();
   develop->add_option("--emissions", arguments.emissions, "the cell's record of emissions")->required();
-  CLI::App* calibrate = add("calibrate", "make a tone curve from a grey wedge", false, true);
+  CLI::App* calibrate = add("calibrate", "make a tone curve from a gray wedge", false, true);
   auto* measured = calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
   calibrate->add_flag("--wedge", arguments.wedge, "write a wedge to paint and measure")->excludes(measured);
   add("quality", "measure how evenly dots lie", false, true)

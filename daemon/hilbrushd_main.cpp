@@ -29,18 +29,18 @@ enum ExitCode { kOk = 0, kInternal = 1, kUsage = 2, kBadInput = 3 };
 /// For the last words of a dying process: whatever else is broken, the beam must be off.
 std::atomic<Daemon*> g_daemon{nullptr};
 
-void darken() noexcept {
+void disarm() noexcept {
   if (Daemon* daemon = g_daemon.exchange(nullptr)) daemon->laser_off();
 }
 
 void darken_and_abort(const std::string& message) {
-  darken();
+  disarm();
   spdlog::critical("{}", message);
   std::abort();
 }
 
 void darken_and_terminate() {
-  darken();
+  disarm();
   spdlog::critical("an exception escaped");
   std::abort();
 }
@@ -74,7 +74,7 @@ int serve(const DaemonOptions& options) {
   spdlog::info("hilbrushd {} listens on {}{}; the cell is stopped", HILBRUSH_VERSION, options.socket.string(), tcp);
   ::sd_notify(0, "READY=1");
   daemon.run();
-  darken();
+  disarm();
   spdlog::info("hilbrushd ends; the laser is off");
   return kOk;
 }

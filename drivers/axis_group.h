@@ -22,7 +22,7 @@ const char* device_state_name(DeviceState state);
 
 /// What every group refuses, whatever its device would say: settling for longer, and targets that are outside of its
 /// bounds by more than rounding (rad, m).
-inline constexpr double kLongestSettleS = 60, kBoundsTolerance = 1e-9;
+inline constexpr double kMaxSettleS = 60, kBoundsTolerance = 1e-9;
 
 template <std::size_t N>
 class AxisGroup {

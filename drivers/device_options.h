@@ -17,7 +17,7 @@ struct AxisScale {
   double steps_per_unit = 1;  ///< steps per rad or m
 
   double to_device(double ours) const { return sign * (ours - offset) * steps_per_unit; }
-  double to_ours(double device) const { return device / (sign * steps_per_unit) + offset; }
+  double to_si(double device) const { return device / (sign * steps_per_unit) + offset; }
 };
 
 /// What an axis may do, whatever it is told.

@@ -11,12 +11,12 @@ double SteadyClock::now_s() const {
 void SteadyClock::sleep_until(double time_s) {
   // One wait of at most an hour at a time: a time_point far in the future would overflow the clock's integer
   // nanoseconds.
-  constexpr double kLongestWaitS = 3600;
+  constexpr double kMaxWaitS = 3600;
   std::unique_lock lock(mutex_);
   while (!is_wake_pending_) {
     const double remaining_s = time_s - now_s();
     if (!(remaining_s > 0)) return;
-    const auto wait = std::chrono::duration<double>(std::min(remaining_s * scale_, kLongestWaitS));
+    const auto wait = std::chrono::duration<double>(std::min(remaining_s * scale_, kMaxWaitS));
     woken_.wait_for(lock, std::chrono::ceil<Steady::duration>(wait), [this] { return is_wake_pending_; });
   }
   is_wake_pending_ = false;

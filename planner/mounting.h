@@ -9,7 +9,7 @@ namespace hilbrush {
 /// The cell with this job's post and plate. Its name and hash stay: what the job changes is in the job's settings.
 CellDescription with_fixture(CellDescription cell, const MountingOptions& mounting);
 
-/// The mesh, standing centred on z = 0, turned about z and then shifted.
+/// The mesh, standing centered on z = 0, turned about z and then shifted.
 TexturedMesh mounted(TexturedMesh mesh, const MountingOptions& mounting);
 
 }  // namespace hilbrush

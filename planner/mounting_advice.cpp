@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kSkippedSample = 150, kReachedSample = 150;
 /// A trial has to help this share of the skipped dots, and this share of all dots.
-constexpr double kLeastHelped = .2, kLeastGain = 5e-4;
+constexpr double kMinHelped = .2, kMinGain = 5e-4;
 constexpr double kHeightFactors[] = {.5};
 constexpr double kHeightStepsM[] = {.02, .04, .08};
 
@@ -53,7 +53,7 @@ Sample choose_sample(const DotSequence& dots, const std::vector<SkippedDot>& ski
   return {sample(helpable, kSkippedSample, random), sample(reached, kReachedSample, random), helpable.size()};
 }
 
-/// From where the object stands to where it would stand on the other axis: taken off the fixture, laid over, centred,
+/// From where the object stands to where it would stand on the other axis: taken off the fixture, laid over, centered,
 /// and mounted as before.
 Eigen::Isometry3d lay_over(const TexturedMesh& mesh, const Standing& standing) {
   using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
@@ -89,7 +89,7 @@ std::optional<MountingAdvice> advise_mounting(const TexturedMesh& mesh, const Ce
                                               std::uint64_t seed) {
   const Sample chosen = choose_sample(dots, skipped, seed);
   const auto count = static_cast<double>(dots.dots.size());
-  if (static_cast<double>(chosen.skipped_count) < kLeastGain * count || chosen.skipped.empty()) return std::nullopt;
+  if (static_cast<double>(chosen.skipped_count) < kMinGain * count || chosen.skipped.empty()) return std::nullopt;
 
   const double now = 1 - static_cast<double>(skipped.size()) / count;
   std::optional<MountingAdvice> best;
@@ -97,11 +97,11 @@ std::optional<MountingAdvice> advise_mounting(const TexturedMesh& mesh, const Ce
                             const Eigen::Isometry3d& moved) {
     const Reach::Implementation reach(trial_mesh, trial_cell, options);
     const double helped = share_reached(reach, dots, chosen.skipped, moved);
-    if (helped < kLeastHelped) return;
+    if (helped < kMinHelped) return;
     const double lost = 1 - share_reached(reach, dots, chosen.reached, moved);
     advice.reached_now = now;
     advice.reached_then = now * (1 - lost) + helped * static_cast<double>(chosen.skipped_count) / count;
-    if (advice.reached_then < (best ? best->reached_then : now) + kLeastGain) return;
+    if (advice.reached_then < (best ? best->reached_then : now) + kMinGain) return;
     best = advice;
   };
 

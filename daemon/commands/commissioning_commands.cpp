@@ -172,7 +172,7 @@ double step_of(const JogFlags& flags, int axis) {
   if (is_linear != flags.by_mm.has_value() || is_linear == flags.by_deg.has_value())
     throw InputError(
         is_linear ? "--by-mm" : "--by-deg",
-        "axis " + flags.axis + " moves by " + (is_linear ? "millimetres" : "degrees") + ": give this and nothing else");
+        "axis " + flags.axis + " moves by " + (is_linear ? "millimeters" : "degrees") + ": give this and nothing else");
   const double step = is_linear ? *flags.by_mm : *flags.by_deg, limit = is_linear ? kStepMaxMm : kStepMaxDeg;
   if (!(std::abs(step) <= limit) || step == 0)
     throw InputError(is_linear ? "--by-mm" : "--by-deg",

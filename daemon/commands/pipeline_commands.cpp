@@ -139,7 +139,7 @@ void add_pipeline_commands(CLI::App& app, CommandContext& context) {
   develop.app->add_option("--emissions", develop.flags->emissions, "the record of what the laser did")->required();
 
   const DeclaredRun calibrate = declare(
-      app, context, "calibrate", "make a tone curve from a grey wedge: on the simulated cell, or painted and measured");
+      app, context, "calibrate", "make a tone curve from a gray wedge: on the simulated cell, or painted and measured");
   auto* measured = calibrate.app->add_option("--measured", calibrate.flags->measured,
                                              "the wedge_steps.json of a painted wedge, with its readings filled in");
   calibrate.app

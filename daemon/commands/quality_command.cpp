@@ -191,7 +191,7 @@ void add_quality_command(CLI::App& app, CommandContext& context) {
       ->add_option(
           "SET", flags->set,
           "what to measure: plane, sphere, monkey_saddle, eight_surface, whitney_umbrella, super_ellipsoid, "
-          "super_ellipsoid_reparameterised or equal_area_sphere; or a model file, on which dots are placed; or "
+          "super_ellipsoid_reparameterized or equal_area_sphere; or a model file, on which dots are placed; or "
           "with --model the dots.ply of a dry run")
       ->required();
   command->add_option("-o,--output", flags->output, "folder for quality.json and plots; made if absent")->required();

@@ -55,9 +55,9 @@ void SettingsFlags::add_to(CLI::App& command) {
   command.add_option("--dpi", dpi, "dots per inch of full tone, 10 to 1200 (default 100)")->group(group);
   command.add_option("--dots", dots, "or: exactly so many dots")->group(group);
   command.add_option("--size-mm", size_mm, "scale the model's longest side to this")->group(group);
-  command.add_option("--units-mm", units_mm, "or: millimetres of one unit of the file")->group(group);
+  command.add_option("--units-mm", units_mm, "or: millimeters of one unit of the file")->group(group);
   command.add_option("--up", up, "the model's upward axis, y or z (default: the format's habit)")->group(group);
-  command.add_option("--untextured", untextured, "parts without texture or colours: auto, blank or material")
+  command.add_option("--untextured", untextured, "parts without texture or colors: auto, blank or material")
       ->group(group);
   command.add_option("--density", density, "what asks for dots: texture, mean_curvature or gaussian_curvature")
       ->group(group);
@@ -93,7 +93,7 @@ void SettingsFlags::add_to(CLI::App& command) {
   command.add_option("--plate-radius-mm", plate_radius_mm, "of the table's plate (default: the cell's)")->group(group);
   command
       .add_option("--offset-mm", offset_mm,
-                  "x,y,z of the object from the middle of the post's top (default 0,0,0: centred, standing on it)")
+                  "x,y,z of the object from the middle of the post's top (default 0,0,0: centered, standing on it)")
       ->delimiter(',')
       ->expected(3)
       ->group(group);

@@ -95,7 +95,7 @@ class Run {
 
   void check_axes_ready();
   void check_laser_ready();
-  void prove_laser_off();
+  void verify_laser_off();
   void end_if_asked() const;
   void end_if_asked_or_paused() const;
   std::span<const Via> vias_of(std::size_t i);
@@ -111,7 +111,7 @@ class Run {
   void prepare_next(std::size_t i);
   template <std::size_t N>
   void prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& told, std::size_t next);
-  void wait_for_sight();
+  void wait_for_fresh_status();
   void check_in_place(const char* when);
   void check_pulse_conditions(const Laser::Status& laser);
   void wait_pulse_end(double fired_s, const Exposure& exposure);
@@ -128,7 +128,7 @@ class Run {
   std::optional<Robot::Positions> robot_target_;  ///< what each chain was last told in this run
   std::optional<Table::Positions> table_target_;
   double rung_down_s_ = 0;         ///< when what was passed without settling will be at rest, on the cell's clock
-  bool is_dark_proved_ = false;    ///< since the last pulse
+  bool is_off_verified_ = false;   ///< since the last pulse
   std::vector<Joints> way_;        ///< to the exposure under way
   std::size_t next_exposure_ = 0;  ///< that exposure
   std::size_t next_via_ = 0;
@@ -150,16 +150,16 @@ void Run::end_if_asked_or_paused() const {
 
 /// One exchange with the device after each pulse, and at the beginning; what has been proved stays so until the next
 /// pulse is asked for, by nobody but this class. The last frame is looked at every time: that costs nothing.
-void Run::prove_laser_off() {
-  if (!is_dark_proved_ && !cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
-  is_dark_proved_ = true;
+void Run::verify_laser_off() {
+  if (!is_off_verified_ && !cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
+  is_off_verified_ = true;
   if (!cell_.laser.status().is_emitting) return;
-  is_dark_proved_ = false;
+  is_off_verified_ = false;
   throw DriverError("the laser emits although it was turned off");
 }
 
 void Run::check_axes_ready() {
-  prove_laser_off();
+  verify_laser_off();
   // After a stop the axes may still be braking.
   const double deadline_s = cell_.clock.now_s() + grace_s(cell_.clock, kGraceS);
   auto robot = cell_.robot.status();
@@ -241,7 +241,7 @@ void Run::send(AxisGroup<N>& chain, const Leg& leg, double settle_s) {
 
 void Run::move(const Leg& leg, Rest rest) {
   end_if_asked();
-  prove_laser_off();
+  verify_laser_off();
   const double settle = rest == Rest::kSettled ? leg.settle_s : 0;
   robot_target_ = robot_part(leg.way.back());
   table_target_ = table_part(leg.way.back());
@@ -320,7 +320,7 @@ std::span<const Via> Run::vias_of(std::size_t i) {
 }
 
 /// Until what is known of both chains is of the present.
-void Run::wait_for_sight() {
+void Run::wait_for_fresh_status() {
   const double begun_s = cell_.clock.now_s();
   const double since_s = begun_s - grace_s(cell_.clock, kSightS, kSightWallS);
   const auto is_seen = [since_s](double read_s) { return read_s == 0 || read_s >= since_s; };
@@ -401,7 +401,7 @@ void Run::prepare_next(std::size_t i) {
 void Run::expose(std::size_t i) {
   const Exposure& exposure = program_.exposures[i];
   check_laser_ready();
-  wait_for_sight();
+  wait_for_fresh_status();
   check_in_place("before");
   end_if_asked_or_paused();
 
@@ -409,16 +409,16 @@ void Run::expose(std::size_t i) {
   try {
     count_own_time();
     own_time_.add(std::exchange(own_s_, 0));
-    is_dark_proved_ = false;
+    is_off_verified_ = false;
     const double fired_s = cell_.clock.now_s();
     cell_.laser.fire(exposure.power_w, exposure.pulse_s);
     prepare_next(i);
     wait_pulse_end(fired_s, exposure);
-    prove_laser_off();
+    verify_laser_off();
     // Whoever cuts a pulse sets the flag before, so a flag that is still clear here means that the pulse was whole.
     end_if_asked();
     // Whoever gates the light may have failed in the pulse and cut it, and an axis may have left its place unseen.
-    wait_for_sight();
+    wait_for_fresh_status();
     const auto after = cell_.laser.status();
     check_pulse_conditions(after);
     if (after.state != DeviceState::kReady)

@@ -14,10 +14,10 @@ namespace {
 /// Dot, pose, exposure, film and pictures, measured on dry runs from 0.1 to 1 million dots.
 constexpr double kBytesADot = 512;
 /// Dots are numbered with 32 bits in programs and films.
-constexpr std::uint64_t kMostDots = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t kMaxDots = std::numeric_limits<std::uint32_t>::max();
 
 /// The pitch before the dots are placed. A job that names their number has about sqrt(area / count) by half tones; the
-/// spot of few cells is given in millimetres, and of those the curve is chosen by it within a tenth.
+/// spot of few cells is given in millimeters, and of those the curve is chosen by it within a tenth.
 double expected_pitch_m(const JobSettings& settings, const TexturedMesh& mesh) {
   const SampleOptions options = sample_options(settings);
   if (options.pitch_m) return *options.pitch_m;
@@ -69,10 +69,10 @@ std::uint64_t dot_limit_by_memory() {
   double kilobytes = 0;
   while (in >> key >> kilobytes) {
     if (key == "MemAvailable:")
-      return static_cast<std::uint64_t>(std::min(kilobytes * 1024 / kBytesADot, static_cast<double>(kMostDots)));
+      return static_cast<std::uint64_t>(std::min(kilobytes * 1024 / kBytesADot, static_cast<double>(kMaxDots)));
     std::getline(in, unit);
   }
-  return kMostDots;
+  return kMaxDots;
 }
 
 }  // namespace hilbrush

@@ -20,7 +20,7 @@ struct PaintedDots {
 };
 
 /// Each emission is matched to the exposure whose joints are nearest to its own, within what real axes are in position
-/// by (half a milliradian, 50 micrometres), in whatever order they were made. Cost O(n log n) and, for each emission,
+/// by (half a milliradian, 50 micrometers), in whatever order they were made. Cost O(n log n) and, for each emission,
 /// the exposures within half a milliradian of its J1.
 PaintedDots match_emissions(const ExposureProgram& program, std::span<const Emission> emissions,
                             std::span<const Hit> hits);

@@ -47,7 +47,7 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
 std::vector<Joints> run_approach(const PipelineRequest& request, const std::filesystem::path& program, std::size_t next,
                                  const Joints& from);
 
-/// Paints grey wedges on the cell's simulated film, or takes the readings of a real one from `measured` (wedge.h;
+/// Paints gray wedges on the cell's simulated film, or takes the readings of a real one from `measured` (wedge.h;
 /// empty: none); writes tone_curve.json (an entry for paint.tone_curves of the cell file) and returns its text.
 std::string run_calibrate(const PipelineRequest& request, const std::filesystem::path& measured,
                           const PipelineListener& listener);

@@ -33,7 +33,7 @@ constexpr std::array<Color, kSkipReasonCount> kReasonColors{{{120, 30, 160},
                                                              {0, 130, 120},
                                                              {235, 80, 190}}};
 
-/// Evenly spaced colours from one end of a scale to the other.
+/// Evenly spaced colors from one end of a scale to the other.
 Color ramp(std::span<const Color> colors, double share) {
   const double place = std::clamp(share, 0., 1.) * static_cast<double>(colors.size() - 1);
   const std::size_t i = std::min(static_cast<std::size_t>(place), colors.size() - 2);
@@ -51,7 +51,7 @@ Color incidence_color(double incidence) {
   return ramp(kColors, incidence / (std::numbers::pi / 4));
 }
 
-/// From the first exposure (violet) to the last (yellow); hues far enough apart that neighbours in time look alike and
+/// From the first exposure (violet) to the last (yellow); hues far enough apart that neighbors in time look alike and
 /// others do not.
 Color order_color(double share) {
   constexpr std::array<Color, 6> kColors{
@@ -159,8 +159,8 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
 
 /// Curves of the time so far, by what it was spent on.
 Plot time_plot(const CellDescription& cell, const ExposureProgram& program) {
-  constexpr std::size_t kMostPoints = 400;
-  const std::size_t step = std::max<std::size_t>(1, program.exposures.size() / kMostPoints);
+  constexpr std::size_t kMaxPoints = 400;
+  const std::size_t step = std::max<std::size_t>(1, program.exposures.size() / kMaxPoints);
   std::array<PlotSeries, 5> series{{{"in all", {}}, {"move", {}}, {"settle", {}}, {"expose", {}}, {"retract", {}}}};
   estimate_time(cell, program, [&](std::size_t exposure, const TimeSplit& so_far) {
     if (exposure % step != 0 && exposure + 1 != program.exposures.size()) return;

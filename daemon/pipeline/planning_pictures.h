@@ -12,12 +12,12 @@
 /// Pictures of a plan for the people who sign it.
 namespace hilbrush {
 
-/// Six views (as in exposure.png), three rows: reach (exposed dots light, skipped ones in the colour of their reason),
-/// incidence (degrees against the face normal), path (lines from dot to dot, coloured from first to last; white where
+/// Six views (as in exposure.png), three rows: reach (exposed dots light, skipped ones in the color of their reason),
+/// incidence (degrees against the face normal), path (lines from dot to dot, colored from first to last; white where
 /// the tool was drawn back in between). Each row has a legend.
 Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const Plan& plan);
 
-/// The colour of a reason on that sheet, sRGB.
+/// The color of a reason on that sheet, sRGB.
 std::array<std::uint8_t, 3> skip_reason_color(SkipReason reason);
 
 /// Writes into `folder` planning.png, that sheet, and time.svg: what the program's time is spent on, over the

@@ -67,12 +67,12 @@ Json mesh_json(const Report::Mesh& mesh) {
 
 /// The largest components, with their own stretch of the path.
 Json components_json(const std::vector<ComponentReport>& components, const std::vector<ComponentPath>& paths) {
-  constexpr std::size_t kMostListed = 32;
+  constexpr std::size_t kMaxListed = 32;
   std::vector<std::size_t> order(components.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return components[a].area_m2 > components[b].area_m2; });
-  order.resize(std::min(order.size(), kMostListed));
+  order.resize(std::min(order.size(), kMaxListed));
   Json list = Json::array();
   for (const std::size_t i : order) {
     const ComponentReport& component = components[i];

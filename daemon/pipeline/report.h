@@ -41,7 +41,7 @@ MotionFigures motion_figures(const ExposureProgram& program);
 /// Where the beam landed against where planning wanted it.
 struct HitFigures {
   double max_error_um = 0;
-  std::uint64_t off_target = 0;  ///< hits farther than 10 micrometres from their dot, and misses
+  std::uint64_t off_target = 0;  ///< hits farther than 10 micrometers from their dot, and misses
   std::uint64_t shadowed = 0;    ///< something stood between lens and focus
 };
 

@@ -20,7 +20,7 @@ constexpr std::array kShares{.02, .05, .08, .12, .16, .2, .25, .3, .36, .43, .5,
 static_assert(kShares.size() == WedgeCard::kColumns * WedgeCard::kRows);
 constexpr std::size_t kFormBytesMax = 1u << 20, kStepsMax = 1000;
 
-/// IEC 61966-2-1, as model files store colours.
+/// IEC 61966-2-1, as model files store colors.
 double srgb_of_linear(double linear) {
   return linear <= .0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - .055;
 }
@@ -99,7 +99,7 @@ std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& pai
           srgb_of_linear(paint.reflectance_white - wanted * (paint.reflectance_white - paint.reflectance_black));
       colors << srgb << ' ' << srgb << ' ' << srgb << ", ";
     }
-  return "#VRML V2.0 utf8\n# A grey wedge: " + std::to_string(WedgeCard::kRows) + " rows of " +
+  return "#VRML V2.0 utf8\n# A gray wedge: " + std::to_string(WedgeCard::kRows) + " rows of " +
          std::to_string(WedgeCard::kColumns) + " fields, the lightest beside the black corner.\n" +
          "Shape { geometry IndexedFaceSet {\n  colorPerVertex FALSE\n  coord Coordinate { point [ " + points.str() +
          "] }\n  coordIndex [ " + faces.str() + "]\n  color Color { color [ " + colors.str() + "] }\n} }\n";

@@ -8,7 +8,7 @@
 #include "planner/cell_model/cell_description.h"
 #include "sim/film/calibrate.h"
 
-/// A grey wedge to be painted by the real cell, and its readings.
+/// A gray wedge to be painted by the real cell, and its readings.
 ///
 /// The card is flat, with fields in rows and columns on white; a black corner marks the first field's side. What a
 /// field is asked for rises from field to field, along the rows, up to the cell's asked_max. Flow:

@@ -9,7 +9,7 @@ Json axes_json(const char* state, const std::string& fault) {
   return {{"state", state}, {"fault", fault.empty() ? Json(nullptr) : Json(fault)}};
 }
 
-/// Millimetres and degrees: for people.
+/// Millimeters and degrees: for people.
 Json joints_json(const Robot::Positions& robot, const Table::Positions& table) {
   constexpr double kDegrees = 180 / std::numbers::pi;
   return {{"j1_deg", robot[kJ1] * kDegrees}, {"j2_deg", robot[kJ2] * kDegrees}, {"j3_mm", robot[kJ3] * 1e3},
@@ -18,10 +18,10 @@ Json joints_json(const Robot::Positions& robot, const Table::Positions& table) {
 
 }  // namespace
 
-CellDesk::CellDesk(CellThread& thread, CellDevices& devices, const CellDescription& description)
+CellController::CellController(CellThread& thread, CellDevices& devices, const CellDescription& description)
     : thread_(thread), devices_(devices), description_(description) {}
 
-const char* CellDesk::state_name() const {
+const char* CellController::state_name() const {
   switch (state_) {
     case State::kStopped:
       return "stopped";
@@ -41,11 +41,11 @@ const char* CellDesk::state_name() const {
   return "unknown";
 }
 
-void CellDesk::refuse(const std::string& act) const {
+void CellController::refuse(const std::string& act) const {
   throw RpcFault{kRpcWrongState, "the cell is " + std::string(state_name()) + ": " + act, ""};
 }
 
-void CellDesk::stop(const std::string& reason, Reply reply) {
+void CellController::stop(const std::string& reason, Reply reply) {
   state_ = State::kStopped;
   is_laser_proved_off_ = false;
   reason_ = reason;
@@ -64,7 +64,7 @@ void CellDesk::stop(const std::string& reason, Reply reply) {
   if (on_stop) on_stop();
 }
 
-void CellDesk::look_at_devices() {
+void CellController::look_at_devices() {
   if (state_ != State::kIdle && state_ != State::kArmed) return;
   const Cell cell = devices_.cell();
   const auto check_axes = [this](const char* name, const auto& axes) {
@@ -83,7 +83,7 @@ void CellDesk::look_at_devices() {
 }
 
 /// While the executor still comes to rest after a stop, its flag must stay up: the clear waits.
-void CellDesk::clear(Reply reply) {
+void CellController::clear(Reply reply) {
   if (state_ != State::kStopped) refuse("there is no stop to clear");
   if (waiting_clear_) refuse("it is being cleared already");
   if (thread_.is_busy())
@@ -92,32 +92,32 @@ void CellDesk::clear(Reply reply) {
     begin_clear(std::move(reply));
 }
 
-void CellDesk::note_executor_at_rest() {
+void CellController::note_executor_at_rest() {
   if (!waiting_clear_ || thread_.is_busy()) return;
   begin_clear(*std::exchange(waiting_clear_, std::nullopt));
 }
 
-CellThread::Done CellDesk::end_of_act(Reply reply, State reached, const char* overtaken) {
+CellThread::Done CellController::end_of_act(Reply reply, State reached, const char* overtaken) {
   return [this, reply = std::move(reply), reached, overtaken, stops = stops_](const std::optional<CellFault>& fault) {
     if (stops != stops_) return reply.fault({kRpcWrongState, overtaken, ""});
     finish_act(reply, reached, fault);
   };
 }
 
-void CellDesk::begin_clear(Reply reply) {
+void CellController::begin_clear(Reply reply) {
   thread_.release_stop();
   state_ = State::kClearing;
   thread_.clear(end_of_act(std::move(reply), State::kIdle, "the cell was stopped again while it was cleared"));
 }
 
-void CellDesk::arm(Reply reply) {
+void CellController::arm(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
   if (state_ != State::kIdle) refuse("it can be armed only when idle");
   state_ = State::kArming;
   thread_.arm(end_of_act(std::move(reply), State::kArmed, "the cell was stopped while it was armed"));
 }
 
-void CellDesk::home(Reply reply) {
+void CellController::home(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
   if (state_ != State::kIdle && state_ != State::kArmed) refuse("it can be homed only when idle or armed");
   const State before = std::exchange(state_, State::kHoming);
@@ -125,7 +125,7 @@ void CellDesk::home(Reply reply) {
 }
 
 /// A device that fails stops the cell: the operator looks, then clears.
-void CellDesk::finish_act(const Reply& reply, State reached, const std::optional<CellFault>& fault) {
+void CellController::finish_act(const Reply& reply, State reached, const std::optional<CellFault>& fault) {
   if (fault) {
     stop(fault->sentence);
     reply.fault({kRpcDeviceFault, fault->sentence, "cell"});
@@ -135,7 +135,7 @@ void CellDesk::finish_act(const Reply& reply, State reached, const std::optional
   reply.result(status());
 }
 
-void CellDesk::begin_painting(const std::string& job) {
+void CellController::begin_painting(const std::string& job) {
   if (state_ == State::kStopped) refuse("clear it (cell.clear) and arm it (cell.arm) before a job can paint");
   if (state_ == State::kIdle) refuse("arm it (cell.arm) before a job can paint");
   if (state_ == State::kPainting) refuse("job " + job_ + " is being painted");
@@ -144,14 +144,14 @@ void CellDesk::begin_painting(const std::string& job) {
   job_ = job;
 }
 
-void CellDesk::end_painting(bool stays_armed) {
+void CellController::end_painting(bool stays_armed) {
   job_.clear();
   if (state_ != State::kPainting) return;
   state_ = stays_armed ? State::kArmed : State::kIdle;
   if (!stays_armed) thread_.disarm();
 }
 
-Json CellDesk::status() {
+Json CellController::status() {
   const Cell cell = devices_.cell();
   const auto robot = cell.robot.status();
   const auto table = cell.table.status();

@@ -17,11 +17,11 @@ struct Reply {
   std::function<void(RpcFault fault)> fault;
 };
 
-class CellDesk {
+class CellController {
  public:
   enum class State { kStopped, kClearing, kIdle, kArming, kArmed, kHoming, kPainting };
 
-  CellDesk(CellThread& thread, CellDevices& devices, const CellDescription& description);
+  CellController(CellThread& thread, CellDevices& devices, const CellDescription& description);
 
   State state() const { return state_; }
   const char* state_name() const;

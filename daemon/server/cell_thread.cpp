@@ -69,7 +69,7 @@ std::filesystem::path copy_file(const PaintOrder& order, const char* stem, const
   return order.folder / (stem + number + extension);
 }
 
-CellThread::CellThread(CellDevices& devices, const CellDescription& description, Post post)
+CellThread::CellThread(CellDevices& devices, const CellDescription& description, PostToSocketThread post)
     : devices_(devices), cell_(devices.cell()), description_(description), post_(std::move(post)) {
   control_.stop.store(true);  // the cell starts stopped
   thread_ = std::thread([this] { run(); });

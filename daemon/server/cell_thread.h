@@ -21,7 +21,7 @@
 namespace hilbrush {
 
 /// Hands a closure to the socket thread. Any thread.
-using Post = std::function<void(std::function<void()>)>;
+using PostToSocketThread = std::function<void(std::function<void()>)>;
 
 /// What to paint, and what its program must have been made from.
 struct PaintOrder {
@@ -60,7 +60,7 @@ class CellThread {
   using Done = std::function<void(std::optional<CellFault>)>;
 
   /// `devices` and `description` outlive it.
-  CellThread(CellDevices& devices, const CellDescription& description, Post post);
+  CellThread(CellDevices& devices, const CellDescription& description, PostToSocketThread post);
   /// Stops, and waits for the thread; nothing is posted any more.
   ~CellThread();
   CellThread(const CellThread&) = delete;
@@ -125,7 +125,7 @@ class CellThread {
   CellDevices& devices_;
   const Cell cell_;
   const CellDescription& description_;
-  const Post post_;
+  const PostToSocketThread post_;
   ExecutionControl control_;
   int orders_under_way_ = 0;      ///< the socket thread's
   std::optional<Loaded> loaded_;  ///< the executor thread's

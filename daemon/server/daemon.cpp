@@ -61,11 +61,11 @@ struct Daemon::Implementation {
   std::unique_ptr<CellDevices> devices;
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   Server server;
-  Post post{[this](std::function<void()> task) { server.post(std::move(task)); }};
+  PostToSocketThread post{[this](std::function<void()> task) { server.post(std::move(task)); }};
   CellThread thread;
   PipelineChildren children;
-  CellDesk desk;
-  JobBook book;
+  CellController desk;
+  JobQueue book;
   MethodTable methods;
   bool is_ending = false;  ///< the socket thread's
 

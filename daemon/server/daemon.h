@@ -11,10 +11,10 @@
 /// hilbrushd as a value: everything that lives between its start and its end. The program's main and the tests hold one
 /// each.
 ///
-///   socket thread (Asio)      Server, MethodTable, JobBook, CellDesk, JobStore, AuditLog: all state of jobs and cell
-///   executor's thread         CellThread: the only one that commands motion
-///   stop thread               CellThread: carries out stops, so that no device delays another request
-///   children's thread         PipelineChildren: starts and watches hilbrush-pipeline, copies models
+///   socket thread (Asio)      Server, MethodTable, JobQueue, CellController, JobStore, AuditLog: all state of jobs and
+///   cell executor's thread         CellThread: the only one that commands motion stop thread               CellThread:
+///   carries out stops, so that no device delays another request children's thread         PipelineChildren: starts and
+///   watches hilbrush-pipeline, copies models
 /// They hand over closures; nothing is shared but the executor's stop and pause flags, and the devices' own thread-safe
 /// calls.
 namespace hilbrush {

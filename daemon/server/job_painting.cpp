@@ -4,11 +4,11 @@
 
 #include "daemon/server/job_queue.h"
 
-/// The part of JobBook that paints: prepare (program and journal are read), approach (the way is planned by a child),
+/// The part of JobQueue that paints: prepare (program and journal are read), approach (the way is planned by a child),
 /// paint, and what becomes of the job afterwards. One job at a time.
 namespace hilbrush {
 
-PaintOrder JobBook::paint_order(const Job& job) const {
+PaintOrder JobQueue::paint_order(const Job& job) const {
   return {job.folder,
           job.model_sha256,
           job.settings_sha256,
@@ -17,7 +17,7 @@ PaintOrder JobBook::paint_order(const Job& job) const {
           false};
 }
 
-void JobBook::begin_run(Job& job, bool exposes_in_doubt) {
+void JobQueue::begin_run(Job& job, bool exposes_in_doubt) {
   if (run_) forbid(job, "job " + std::to_string(run_->job) + " still holds the cell");
   desk_.begin_painting(std::to_string(job.id));
   job.is_part_confirmed = true;
@@ -39,7 +39,7 @@ void JobBook::begin_run(Job& job, bool exposes_in_doubt) {
 }
 
 /// The way from where the axes really are to the next dot: planned anew by a child, because the daemon knows no mesh.
-void JobBook::approach(const Prepared& prepared) {
+void JobQueue::approach(const Prepared& prepared) {
   Job& job = jobs_.at(run_->job);
   if (prepared.fault) {
     ExecutionResult result;
@@ -99,7 +99,7 @@ void JobBook::approach(const Prepared& prepared) {
   run_->child = children_.start(std::move(order));
 }
 
-void JobBook::paint(std::vector<Joints> way) {
+void JobQueue::paint(std::vector<Joints> way) {
   Job& job = jobs_.at(run_->job);
   run_->phase = PaintRun::Phase::kPainting;
   run_->child.reset();
@@ -114,7 +114,7 @@ void JobBook::paint(std::vector<Joints> way) {
       });
 }
 
-void JobBook::note_progress(std::size_t exposed) {
+void JobQueue::note_progress(std::size_t exposed) {
   if (!run_) return;
   Job& job = jobs_.at(run_->job);
   job.exposed = exposed;
@@ -130,14 +130,14 @@ void JobBook::note_progress(std::size_t exposed) {
   changed(job, false);
 }
 
-void JobBook::take_tally(Job& job, const PaintTally& tally) {
+void JobQueue::take_tally(Job& job, const PaintTally& tally) {
   job.exposed = tally.exposed;
   job.in_doubt = tally.in_doubt;
   job.progress =
       static_cast<double>(job.exposed) / static_cast<double>(std::max<std::uint64_t>(job.exposure_count(), 1));
 }
 
-void JobBook::note_own_time(Job& job, const DurationHistogram& own_time) {
+void JobQueue::note_own_time(Job& job, const DurationHistogram& own_time) {
   job.own_times.add(own_time);
   const double scale = description_.simulation.time_scale;
   if (own_time.count() > 0)
@@ -157,13 +157,13 @@ std::string measured_text(const MeasuredMotion& motion) {
 
 }  // namespace
 
-void JobBook::note_motion(Job& job, const MotionTimes& motion) {
+void JobQueue::note_motion(Job& job, const MotionTimes& motion) {
   job.motion_times.add(motion);
   if (const auto measured = job.motion_times.measured()) job.measured = measured_text(*measured);
 }
 
 /// After each copy but the last the job waits for its next part.
-void JobBook::finish_copy(Job& job) {
+void JobQueue::finish_copy(Job& job) {
   ++job.copies_done;
   if (job.copies_done >= job.copies) {
     job.state = JobState::kDone;
@@ -181,7 +181,7 @@ void JobBook::finish_copy(Job& job) {
   job.eta_s = job.planned_s * description_.simulation.time_scale;
 }
 
-void JobBook::finish_run(const ExecutionResult& result, const PaintTally& tally) {
+void JobQueue::finish_run(const ExecutionResult& result, const PaintTally& tally) {
   Job& job = jobs_.at(run_->job);
   const bool is_cancelled = run_->is_cancelled;
   run_.reset();
@@ -218,14 +218,14 @@ void JobBook::finish_run(const ExecutionResult& result, const PaintTally& tally)
   changed(job);
 }
 
-void JobBook::handle_stop() {
+void JobQueue::handle_stop() {
   for (auto& [id, job] : jobs_) job.is_part_confirmed = false;
   leave_approach(ExecutionOutcome::kStopped, "the cell was stopped");
 }
 
 /// While the executor runs, its own end tells how the run ended; while the approach is planned, nothing else would.
 /// True if it was.
-bool JobBook::leave_approach(ExecutionOutcome outcome, const std::string& reason) {
+bool JobQueue::leave_approach(ExecutionOutcome outcome, const std::string& reason) {
   if (!run_ || run_->phase != PaintRun::Phase::kApproaching) return false;
   if (run_->child) children_.cancel(*run_->child);
   thread_.release();
@@ -235,7 +235,7 @@ bool JobBook::leave_approach(ExecutionOutcome outcome, const std::string& reason
 }
 
 /// What the journals say, one job at a time: the executor's thread has a short queue.
-void JobBook::inspect_next() {
+void JobQueue::inspect_next() {
   // Jobs that end in the meantime may have pushed one out of the history.
   while (!to_inspect_.empty() && !jobs_.contains(to_inspect_.back())) to_inspect_.pop_back();
   if (to_inspect_.empty() || is_ending_) return;

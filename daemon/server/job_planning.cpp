@@ -4,12 +4,12 @@
 #include "daemon/server/model_copy.h"
 #include "sampling/base/input_error.h"
 
-/// The part of JobBook that plans: a job's files are listed, copied and planned by children, one job at a time.
+/// The part of JobQueue that plans: a job's files are listed, copied and planned by children, one job at a time.
 namespace hilbrush {
 
 namespace fs = std::filesystem;
 
-void JobBook::plan_next() {
+void JobQueue::plan_next() {
   if (planning_ || is_ending_) return;
   const auto waiting = queue();
   const auto found =
@@ -33,14 +33,14 @@ void JobBook::plan_next() {
 }
 
 /// The job that is being planned, if it still is.
-Job* JobBook::planned_job(std::int64_t id) {
+Job* JobQueue::planned_job(std::int64_t id) {
   return planning_ && planning_->job == id ? &jobs_.at(id) : nullptr;
 }
 
 /// What all children of the pipeline have in common: the callbacks come home to the socket thread and find the job
 /// still being planned, or do nothing.
-ChildOrder JobBook::watched_order(const Job& job, std::vector<std::string> arguments,
-                                  std::function<void(Job&, ChildOutcome)> on_end) {
+ChildOrder JobQueue::watched_order(const Job& job, std::vector<std::string> arguments,
+                                   std::function<void(Job&, ChildOutcome)> on_end) {
   ChildOrder order;
   order.arguments = std::move(arguments);
   order.on_progress = [this, id = job.id](const std::string& stage, double fraction) {
@@ -68,14 +68,14 @@ ChildOrder JobBook::watched_order(const Job& job, std::vector<std::string> argum
 
 /// Which files a model refers to is found by reading it, and reading untrusted bytes is a child's work, done with the
 /// submitter's rights.
-void JobBook::list_files(Job& job) {
+void JobQueue::list_files(Job& job) {
   ChildOrder order = watched_order(job, {"files", "--model", job.model.string()},
                                    [this](Job& planned, const ChildOutcome& outcome) { copy_files(planned, outcome); });
   order.owner = ChildOwner{job.uid, job.gid};
   planning_->child = children_.start(std::move(order));
 }
 
-void JobBook::copy_files(Job& job, const ChildOutcome& outcome) {
+void JobQueue::copy_files(Job& job, const ChildOutcome& outcome) {
   planning_->child.reset();
   if (!outcome.is_ok) return fail_planning(job, {outcome.error_at, outcome.error});
   std::vector<fs::path> files;
@@ -107,7 +107,7 @@ void JobBook::copy_files(Job& job, const ChildOutcome& outcome) {
   });
 }
 
-void JobBook::run_pipeline(Job& job) {
+void JobQueue::run_pipeline(Job& job) {
   job.stage = "load";
   changed(job);
   planning_->child = children_.start(
@@ -117,7 +117,7 @@ void JobBook::run_pipeline(Job& job) {
                     [this](Job& planned, const ChildOutcome& outcome) { finish_pipeline(planned, outcome); }));
 }
 
-void JobBook::finish_pipeline(Job& job, const ChildOutcome& outcome) {
+void JobQueue::finish_pipeline(Job& job, const ChildOutcome& outcome) {
   if (!outcome.is_ok) return fail_planning(job, {outcome.error_at, outcome.error});
   try {
     const Json report = Json::parse(outcome.result);
@@ -140,7 +140,7 @@ void JobBook::finish_pipeline(Job& job, const ChildOutcome& outcome) {
   end_planning();
 }
 
-void JobBook::fail_planning(Job& job, JobError error) {
+void JobQueue::fail_planning(Job& job, JobError error) {
   job.state = JobState::kFailed;
   job.stage.clear();
   job.error = std::move(error);
@@ -148,7 +148,7 @@ void JobBook::fail_planning(Job& job, JobError error) {
   end_planning();
 }
 
-void JobBook::end_planning() {
+void JobQueue::end_planning() {
   planning_.reset();
   plan_next();
 }

@@ -54,8 +54,8 @@ void forbid(const Job& job, const std::string& why) {
   throw RpcFault{kRpcWrongState, "job " + std::to_string(job.id) + " is " + job_state_name(job.state) + ": " + why, ""};
 }
 
-JobBook::JobBook(Place place, JobStore& store, CellDesk& desk, CellThread& thread, PipelineChildren& children,
-                 const CellDescription& description, Post post)
+JobQueue::JobQueue(JobPaths place, JobStore& store, CellController& desk, CellThread& thread,
+                   PipelineChildren& children, const CellDescription& description, PostToSocketThread post)
     : place_(std::move(place)),
       store_(store),
       desk_(desk),
@@ -66,7 +66,7 @@ JobBook::JobBook(Place place, JobStore& store, CellDesk& desk, CellThread& threa
   desk_.on_stop = [this] { handle_stop(); };
 }
 
-void JobBook::changed(Job& job, bool is_stored) {
+void JobQueue::changed(Job& job, bool is_stored) {
   ++job.seq;
   if (is_stored) {
     if (is_final(job.state) && job.ended.empty()) job.ended = utc_now();
@@ -79,7 +79,7 @@ void JobBook::changed(Job& job, bool is_stored) {
 
 /// A store that can't be written must not keep a cell from being stopped or a dot from being counted: the journal has
 /// what matters, and the next change writes again.
-void JobBook::keep(Job& job) {
+void JobQueue::keep(Job& job) {
   try {
     store_.update(job);
     write_record(job);
@@ -89,7 +89,7 @@ void JobBook::keep(Job& job) {
   }
 }
 
-std::vector<const Job*> JobBook::queue() const {
+std::vector<const Job*> JobQueue::queue() const {
   std::vector<const Job*> waiting;
   for (const auto& [id, job] : jobs_)
     if (is_in_queue(job.state)) waiting.push_back(&job);
@@ -98,13 +98,13 @@ std::vector<const Job*> JobBook::queue() const {
   return waiting;
 }
 
-void JobBook::update_positions() {
+void JobQueue::update_positions() {
   for (auto& [id, job] : jobs_) job.position = 0;
   int position = 0;
   for (const Job* job : queue()) jobs_.at(job->id).position = ++position;
 }
 
-void JobBook::forget_oldest(const Job& spared) {
+void JobQueue::forget_oldest(const Job& spared) {
   const auto count =
       std::count_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return is_final(entry.second.state); });
   if (static_cast<std::size_t>(count) <= kHistoryMax) return;
@@ -116,7 +116,7 @@ void JobBook::forget_oldest(const Job& spared) {
 
 /// By the records in the jobs' folders; a folder whose record is lost too keeps its number, so that no new job gets its
 /// files.
-std::string JobBook::find_lost_jobs() {
+std::string JobQueue::find_lost_jobs() {
   std::size_t found = 0, lost = 0;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(place_.jobs_folder, error)) {
@@ -143,7 +143,7 @@ std::string JobBook::find_lost_jobs() {
          (lost > 0 ? "; of " + std::to_string(lost) + " only the files are left" : "");
 }
 
-std::string JobBook::restore() {
+std::string JobQueue::restore() {
   std::string notice;
   if (store_.is_new()) notice = find_lost_jobs();
   for (Job& job : store_.load_recent(kHistoryMax)) {
@@ -168,12 +168,12 @@ std::string JobBook::restore() {
   return notice;
 }
 
-void JobBook::shut_down() {
+void JobQueue::shut_down() {
   is_ending_ = true;
   if (planning_ && planning_->child) children_.cancel(*planning_->child);
 }
 
-Job& JobBook::get(const std::string& id) {
+Job& JobQueue::get(const std::string& id) {
   const bool is_number =
       !id.empty() && id.size() < 19 && std::all_of(id.begin(), id.end(), [](char c) { return c >= '0' && c <= '9'; });
   const auto found = is_number ? jobs_.find(std::stoll(id)) : jobs_.end();
@@ -184,7 +184,7 @@ Job& JobBook::get(const std::string& id) {
   return *archived_;
 }
 
-Job& JobBook::submit(const SubmitOrder& order, const Peer& peer) {
+Job& JobQueue::submit(const SubmitOrder& order, const Peer& peer) {
   if (!order.model.is_absolute()) throw RpcFault{kRpcBadParams, "must be an absolute path", "$.model"};
   JobSettings settings;
   try {
@@ -241,7 +241,7 @@ Job& JobBook::submit(const SubmitOrder& order, const Peer& peer) {
   return kept;
 }
 
-Job& JobBook::start(const std::string& id) {
+Job& JobQueue::start(const std::string& id) {
   Job& job = get(id);
   if (job.state == JobState::kPaused) forbid(job, "it goes on with job.resume");
   if (job.dry_run) forbid(job, "a dry run is never painted");
@@ -250,7 +250,7 @@ Job& JobBook::start(const std::string& id) {
   return job;
 }
 
-Job& JobBook::resume(const std::string& id, bool exposes_in_doubt, bool is_part_in_place) {
+Job& JobQueue::resume(const std::string& id, bool exposes_in_doubt, bool is_part_in_place) {
   Job& job = get(id);
   if (job.state == JobState::kReady) forbid(job, "it begins with job.start");
   if (job.state != JobState::kPaused) forbid(job, "only a paused job can be resumed");
@@ -264,7 +264,7 @@ Job& JobBook::resume(const std::string& id, bool exposes_in_doubt, bool is_part_
   return job;
 }
 
-Job& JobBook::move(const std::string& id, int position) {
+Job& JobQueue::move(const std::string& id, int position) {
   Job& job = get(id);
   if (!is_in_queue(job.state)) forbid(job, "only a job that waits has a place in the queue");
   std::vector<const Job*> order = queue();
@@ -286,7 +286,7 @@ Job& JobBook::move(const std::string& id, int position) {
   return job;
 }
 
-Job& JobBook::pause(const std::string& id) {
+Job& JobQueue::pause(const std::string& id) {
   Job& job = get(id);
   if (job.state != JobState::kPainting) forbid(job, "only a job that is being painted can be paused");
   thread_.pause();
@@ -296,7 +296,7 @@ Job& JobBook::pause(const std::string& id) {
   return job;
 }
 
-Job& JobBook::cancel(const std::string& id) {
+Job& JobQueue::cancel(const std::string& id) {
   Job& job = get(id);
   if (is_final(job.state)) forbid(job, "there is nothing to cancel");
   if (job.state == JobState::kPainting) {

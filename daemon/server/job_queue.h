@@ -29,20 +29,20 @@ struct SubmitOrder {
 /// @throws RpcFault that says which state of the job forbids what.
 [[noreturn]] void forbid(const Job& job, const std::string& why);
 
-class JobBook {
+class JobQueue {
  public:
   static constexpr std::size_t kWaitingMax = 100;  ///< jobs queued or being planned
   static constexpr std::size_t kHistoryMax =
       1000;  ///< final jobs kept in memory; older ones are looked up when asked for
   static constexpr int kCopiesMax = 1000;
 
-  struct Place {
+  struct JobPaths {
     std::filesystem::path jobs_folder;
     std::filesystem::path cell_file;
   };
 
-  JobBook(Place place, JobStore& store, CellDesk& desk, CellThread& thread, PipelineChildren& children,
-          const CellDescription& description, Post post);
+  JobQueue(JobPaths place, JobStore& store, CellController& desk, CellThread& thread, PipelineChildren& children,
+           const CellDescription& description, PostToSocketThread post);
 
   /// Jobs of an earlier life: what was painting is paused, what was planning is queued again. If the store is new, jobs
   /// are found again by the records in their folders. Call once, before the first request. @return a sentence for the
@@ -119,13 +119,13 @@ class JobBook {
   bool leave_approach(ExecutionOutcome outcome, const std::string& reason);
   void inspect_next();
 
-  Place place_;
+  JobPaths place_;
   JobStore& store_;
-  CellDesk& desk_;
+  CellController& desk_;
   CellThread& thread_;
   PipelineChildren& children_;
   const CellDescription& description_;
-  Post post_;
+  PostToSocketThread post_;
   std::map<std::int64_t, Job> jobs_;
   std::optional<Job> archived_;  ///< the last one that was asked for and is no longer in jobs_
   std::string store_fault_;

@@ -116,14 +116,15 @@ Json job_result(const Job& job) {
 
 }  // namespace
 
-MethodTable::MethodTable(JobBook& book, CellDesk& desk, AuditLog& audit, std::function<Json()> info) : audit_(audit) {
+MethodTable::MethodTable(JobQueue& book, CellController& desk, AuditLog& audit, std::function<Json()> info)
+    : audit_(audit) {
   add_job_methods(book);
   add_cell_methods(desk);
   add_system_methods(std::move(info));
   add_session_method();
 }
 
-void MethodTable::add_job_methods(JobBook& book) {
+void MethodTable::add_job_methods(JobQueue& book) {
   const Json job = result_with("job", reference("Job"));
   const auto add_act = [&](const char* name, const char* summary, Json params,
                            std::function<Job&(const Json&, const Caller&)> act) {
@@ -145,7 +146,7 @@ void MethodTable::add_job_methods(JobBook& book) {
        {"copies",
         {{"type", "integer"},
          {"minimum", 1},
-         {"maximum", JobBook::kCopiesMax},
+         {"maximum", JobQueue::kCopiesMax},
          {"description", "parts to paint, one after another; default 1"}}}},
       {"model"});
   add_act("job.submit", "Takes a model; answers at once, the job is queued.", submit_params,
@@ -220,7 +221,7 @@ void MethodTable::add_job_methods(JobBook& book) {
                       }});
 }
 
-void MethodTable::add_cell_methods(CellDesk& desk) {
+void MethodTable::add_cell_methods(CellController& desk) {
   const Json cell = result_with("cell", reference("Cell"));
   methods_.push_back({"cell.status", "The cell's state, laser, interlock, joints and devices.", false, no_params(),
                       cell, [&desk](const Json&, const Caller&, const Reply& reply) { reply.result(desk.status()); }});

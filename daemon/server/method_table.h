@@ -37,7 +37,7 @@ struct Method {
 class MethodTable {
  public:
   /// `info` answers system.info.
-  MethodTable(JobBook& book, CellDesk& desk, AuditLog& audit, std::function<Json()> info);
+  MethodTable(JobQueue& book, CellController& desk, AuditLog& audit, std::function<Json()> info);
 
   /// Answers once, now or later.
   void dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const;
@@ -46,8 +46,8 @@ class MethodTable {
   const std::vector<Method>& methods() const { return methods_; }
 
  private:
-  void add_job_methods(JobBook& book);
-  void add_cell_methods(CellDesk& desk);
+  void add_job_methods(JobQueue& book);
+  void add_cell_methods(CellController& desk);
   void add_system_methods(std::function<Json()> info);
   void add_session_method();
 

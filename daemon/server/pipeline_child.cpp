@@ -173,8 +173,8 @@ void PipelineChildren::cancel(ChildId id) {
   });
 }
 
-void PipelineChildren::run(std::function<void()> errand) {
-  push(std::move(errand));
+void PipelineChildren::run(std::function<void()> task) {
+  push(std::move(task));
 }
 
 void PipelineChildren::watch() {
@@ -199,7 +199,7 @@ void PipelineChildren::watch() {
       check_limits(*child);
       report_progress(*child, Steady::now() - child->last_told >= kProgressInterval);
     }
-    std::erase_if(children_, [this](const auto& child) { return bury(*child); });
+    std::erase_if(children_, [this](const auto& child) { return reap(*child); });
   }
   for (const auto& child : children_) {
     ::kill(-child->pid, SIGKILL);
@@ -334,7 +334,7 @@ void PipelineChildren::kill_child(Child& child, std::string sentence) {
 }
 
 /// True once the child is gone and its end is told.
-bool PipelineChildren::bury(Child& child) {
+bool PipelineChildren::reap(Child& child) {
   siginfo_t info{};
   if (::waitid(P_PID, static_cast<id_t>(child.pid), &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
     return false;

@@ -66,7 +66,7 @@ class PipelineChildren {
   /// Kills the child if it still runs; its on_end may still have been called before.
   void cancel(ChildId id);
   /// Short work (copying a model) that must not be done on the socket thread.
-  void run(std::function<void()> errand);
+  void run(std::function<void()> task);
 
  private:
   struct Child;
@@ -78,7 +78,7 @@ class PipelineChildren {
   void check_limits(Child& child);
   void kill_child(Child& child, std::string sentence);
   void report_progress(Child& child, bool is_due);
-  bool bury(Child& child);
+  bool reap(Child& child);
 
   const std::filesystem::path program_;
   const ChildLimits limits_;

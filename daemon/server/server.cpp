@@ -62,9 +62,9 @@ class Session : public std::enable_shared_from_this<Session> {
       : socket_(std::move(socket)),
         limits_(limits),
         services_(services),
-        goodbye_(std::move(goodbye)),
+        on_closed_(std::move(goodbye)),
         peer_(std::move(peer)),
-        patience_(socket_.get_executor()) {}
+        identify_timer_(socket_.get_executor()) {}
 
   void begin();
   void close();
@@ -88,24 +88,24 @@ class Session : public std::enable_shared_from_this<Session> {
   Stream::socket socket_;
   const ServerLimits limits_;
   const Services services_;
-  const Goodbye goodbye_;
+  const Goodbye on_closed_;
   Peer peer_;
-  asio::steady_timer patience_;  ///< with a connection that has not said who it is
+  asio::steady_timer identify_timer_;  ///< with a connection that has not said who it is
   std::array<char, 65536> chunk_{};
   std::string inbox_;             ///< bytes not yet served: at most a line and a chunk
   std::size_t searched_ = 0;      ///< of inbox_: holds no end of line before
   std::string outbox_, writing_;  ///< not yet handed to the system, being handed
   std::size_t pending_replies_ = 0;
-  std::set<std::int64_t> watched_, news_;  ///< jobs; those of them that changed since they were last told
+  std::set<std::int64_t> watched_, pending_updates_;  ///< jobs; those of them that changed since they were last told
   bool is_reading_ = false, is_writing_ = false, is_at_end_ = false, is_closed_ = false, is_serving_ = false,
        is_refused_ = false;
 };
 
 void Session::begin() {
   if (peer_.user.empty()) {
-    patience_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+    identify_timer_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(
         std::chrono::duration<double>(limits_.identify_s)));
-    patience_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
+    identify_timer_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
       if (const auto self = weak.lock(); self && !error && self->peer_.user.empty()) self->close();
     });
   }
@@ -117,7 +117,7 @@ std::optional<Peer> Session::identify(const std::string& token) {
   auto peer = services_.access.token_peer(token, address);
   if (peer) {
     peer_ = *peer;
-    patience_.cancel();
+    identify_timer_.cancel();
   } else {
     is_refused_ = true;  // what it sends after a wrong token is not read
   }
@@ -213,7 +213,7 @@ Caller Session::caller() {
           [weak](std::int64_t job) {
             if (const auto self = weak.lock()) {
               self->watched_.erase(job);
-              self->news_.erase(job);
+              self->pending_updates_.erase(job);
             }
           }};
 }
@@ -262,7 +262,7 @@ void Session::write() {
 
 void Session::notify(const Job& job) {
   if (!watched_.contains(job.id)) return;
-  news_.insert(job.id);
+  pending_updates_.insert(job.id);
   tell_news();
 }
 
@@ -270,7 +270,7 @@ void Session::notify(const Job& job) {
 /// never a queue.
 void Session::tell_news() {
   if (is_writing_ || is_closed_ || is_at_end_) return;
-  for (const std::int64_t id : std::exchange(news_, {})) {
+  for (const std::int64_t id : std::exchange(pending_updates_, {})) {
     const auto job = services_.book.jobs().find(id);
     if (job != services_.book.jobs().end())
       send(rpc_notification("job.update", {{"seq", job->second.seq}, {"job", job_to_json(job->second)}}));
@@ -287,7 +287,7 @@ void Session::close() {
   if (std::exchange(is_closed_, true)) return;
   boost::system::error_code ignored;
   socket_.close(ignored);
-  goodbye_(shared_from_this());
+  on_closed_(shared_from_this());
 }
 
 struct Server::Implementation {
@@ -303,9 +303,9 @@ struct Server::Implementation {
   std::filesystem::path socket_file;
   std::unordered_set<std::shared_ptr<Session>> sessions;
 
-  Peer welcome(Local::socket& socket, const Services& services) { return peer_of(socket, services.access); }
+  Peer identify_peer(Local::socket& socket, const Services& services) { return peer_of(socket, services.access); }
   /// Nobody yet.
-  Peer welcome(Tcp::socket& socket, const Services&) {
+  Peer identify_peer(Tcp::socket& socket, const Services&) {
     boost::system::error_code error;
     const auto remote = socket.remote_endpoint(error);
     socket.set_option(Tcp::no_delay(true), error);
@@ -327,7 +327,7 @@ struct Server::Implementation {
       }
       // Beyond the limit the connection is closed at once, which the client sees.
       if (sessions.size() < limits.clients) {
-        Peer peer = welcome(socket, services);
+        Peer peer = identify_peer(socket, services);
         const auto session =
             std::make_shared<Session>(std::move(socket), std::move(peer), limits, services,
                                       [this](const std::shared_ptr<Session>& gone) { sessions.erase(gone); });

@@ -71,7 +71,7 @@ void DriveGroup<N>::connect() {
     const std::lock_guard lock(mutex_);
     fault_.clear();
     forget_target();
-    for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_ours(readings[i].position);
+    for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_si(readings[i].position);
     state_ = DeviceState::kConnected;
   }
   start_polling();
@@ -194,7 +194,7 @@ double DriveGroup<N>::travel_s(const Positions& target) const {
 
 template <std::size_t N>
 void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
-  if (!(settle_s >= 0) || settle_s > kLongestSettleS)
+  if (!(settle_s >= 0) || settle_s > kMaxSettleS)
     throw DriverError("the " + name_ + " refuses a settle time that is no time");
   check_bounds(target);
   const std::unique_lock command(command_mutex_, deadline_in(1));
@@ -375,7 +375,7 @@ void DriveGroup<N>::take(const Readings& readings, double begun_s) {
   bool is_news = false;
   {
     const std::lock_guard lock(mutex_);
-    for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_ours(readings[i].position);
+    for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_si(readings[i].position);
     read_s_ = begun_s;
     const bool was_in_position = is_in_position_;
     if (!is_target_current_ || !is_accepted_ || begun_s < accepted_s_ || !is_at_target(readings)) {

@@ -37,7 +37,7 @@ DobotRobot::~DobotRobot() {
 
 DobotRobot::Positions DobotRobot::ours(const DobotJoints& joints) const {
   Positions positions;
-  for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = options_.scales[i].to_ours(joints[i]);
+  for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = options_.scales[i].to_si(joints[i]);
   return positions;
 }
 
@@ -239,8 +239,7 @@ double DobotRobot::travel_s(const DobotJoints& from, const DobotJoints& to) cons
 }
 
 void DobotRobot::move_to(const Positions& target, double settle_s) {
-  if (!(settle_s >= 0) || settle_s > kLongestSettleS)
-    throw DriverError("the robot refuses a settle time that is no time");
+  if (!(settle_s >= 0) || settle_s > kMaxSettleS) throw DriverError("the robot refuses a settle time that is no time");
   check_bounds(target);
   DobotJoints joints;
   for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = options_.scales[i].to_device(target[i]);

@@ -78,7 +78,7 @@ void GuardServer::send_status() {
   send(guard::encode(message));
 }
 
-bool GuardServer::darken() {
+bool GuardServer::disarm() {
   const bool is_shut = gate_ == nullptr || gate_->off();
   const bool is_disarmed = head_.status().state == DeviceState::kDisconnected || head_.disarm();
   is_disarmed_ = is_shut && is_disarmed;
@@ -91,7 +91,7 @@ void GuardServer::trip(const std::string& sentence) {
     trip_ = sentence;
     requests_.clear();
   }
-  darken();
+  disarm();
   send_status();
 }
 
@@ -124,11 +124,11 @@ GuardServer::End GuardServer::run() {
     }
     if (Steady::now() >= status_deadline) {
       status_deadline = deadline_in(kStatusS);
-      if (!is_disarmed_ && !trip_.empty()) darken();
+      if (!is_disarmed_ && !trip_.empty()) disarm();
       send_status();
     }
   }
-  for (int attempt = 0; attempt < kDarkenAttempts && !darken(); ++attempt)
+  for (int attempt = 0; attempt < kDarkenAttempts && !disarm(); ++attempt)
     std::this_thread::sleep_for(std::chrono::duration<double>(kDarkenRetryS));
   return *end;
 }
@@ -166,7 +166,7 @@ void GuardServer::obey_at_once(const guard::Request& request) {
       });
     }
     const bool is_gate = request.verb == guard::Verb::kGateOff;
-    const bool is_off = is_gate ? gate_ == nullptr || gate_->off() : darken();
+    const bool is_off = is_gate ? gate_ == nullptr || gate_->off() : disarm();
     send(guard::encode(guard::Reply{request.number, is_off, is_off ? "" : "the laser does not confirm"}));
     return;
   }
@@ -232,7 +232,7 @@ std::string GuardServer::carry_out(const guard::Request& request) {
       head_.set_power(request.value);
       return {};
     case guard::Verb::kClear: {
-      if (!darken()) throw DriverError("the laser does not confirm that it is off");
+      if (!disarm()) throw DriverError("the laser does not confirm that it is off");
       if (head_.status().state == DeviceState::kFault) head_.clear_fault();
       const std::lock_guard lock(mutex_);
       trip_.clear();

@@ -47,7 +47,7 @@ class GuardServer {
   std::string carry_out(const guard::Request& request);
   void send(const std::string& message);
   void send_status();
-  bool darken();
+  bool disarm();
   void trip(const std::string& sentence);
 
   LaserHead& head_;

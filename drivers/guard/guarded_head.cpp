@@ -57,7 +57,7 @@ class GuardedHead::RemoteGate final : public Gate {
     return head_.is_gate_on_;
   }
   void set_listener(Listener listener) override { listener_ = std::move(listener); }
-  void tell_dark() {
+  void on_gate_closed() {
     if (listener_) listener_(true);
   }
 
@@ -191,7 +191,7 @@ void GuardedHead::take(const guard::StatusMessage& message) {
     is_gate_on_ = message.is_gate_on;
     status_ = std::move(status);
   }
-  if (is_dark) gate_->tell_dark();
+  if (is_dark) gate_->on_gate_closed();
   if (is_news && on_change_) on_change_();
   if (is_news) clock_.wake();
 }

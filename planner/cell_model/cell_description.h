@@ -11,7 +11,7 @@
 /// focus, +z along the beam. R table; O object: on the fixture's post, +z along the C axis, z = 0 at the post's top.
 /// Arm (SCARA): J1, J2 revolute about z, J3 prismatic (the flange's height), J4 revolute about z. yaw = J1 + J2 + J4.
 /// Beam direction in W: (cos e cos yaw, cos e sin yaw, -sin e) with e the beam depression; the focus lies
-/// `flange_to_focus_m` along it from the flange's centre. Table: tilt A about the axis through `tilt_axis_W` along -y
+/// `flange_to_focus_m` along it from the flange's center. Table: tilt A about the axis through `tilt_axis_W` along -y
 /// (A > 0 brings the object's top towards the robot, -x), then rotation C about the tilted z: X_WO = T(tilt_axis_W) *
 /// Ry(-A) * T(0, 0, plate_height_m + post_height_m) * Rz(C).
 namespace hilbrush {

@@ -68,7 +68,7 @@ class NormalFollower {
       TableSolution solutions[2];
       const int count = solve_table(reach_.kinematics, tilt, beam_O, solutions);
       for (int s = 0; s < count; ++s) {
-        const double rotation = reach_.kinematics.wind(kRotation, solutions[s].rotation, now_[kRotation]);
+        const double rotation = reach_.kinematics.unwrap_near(kRotation, solutions[s].rotation, now_[kRotation]);
         const TablePose table = reach_.kinematics.table_pose(tilt, rotation);
         for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
           Joints joints = now_;

@@ -9,12 +9,12 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kNeighbours = 8;
+constexpr std::size_t kNeighbors = 8;
 constexpr std::int64_t kWindow = 5000;  // places that one move may shift or reverse
 constexpr std::int64_t kKickWindow = 1000;
 constexpr std::size_t kTourBlock = 1 << 15;  // dots that are improved together
 constexpr std::int32_t kNone = -1;           // beyond an end of the path
-constexpr float kLeastGainS = 1e-6F;
+constexpr float kMinGainS = 1e-6F;
 /// What turning the tool saves a step is not always to be had, because turns add up.
 constexpr float kHopedFor = .7F;
 
@@ -34,15 +34,15 @@ class PathCost {
   StepCost step_;
 };
 
-struct Neighbour {
+struct Neighbor {
   std::int32_t dot;
   float step_s;  ///< what going there costs, asked for too often to be worked out each time
 };
 
 /// The nearest dots of each dot, by a hash-free grid: dots sorted by cell.
-class Neighbours {
+class Neighbors {
  public:
-  Neighbours(std::span<const PathDot> path, const PathCost& cost) : path_(path) {
+  Neighbors(std::span<const PathDot> path, const PathCost& cost) : path_(path) {
     const std::size_t n = path.size();
     Eigen::Array3f low = path[0].position_O.array(), high = low;
     std::vector<float> steps;
@@ -69,7 +69,7 @@ class Neighbours {
     find_all(cost);
   }
 
-  std::span<const Neighbour> of(std::int32_t dot) const {
+  std::span<const Neighbor> of(std::int32_t dot) const {
     const std::size_t i = static_cast<std::size_t>(dot);
     return {near_.data() + first_[i], first_[i + 1] - first_[i]};
   }
@@ -84,12 +84,12 @@ class Neighbours {
   void find_all(const PathCost& cost) {
     const std::size_t n = path_.size();
     first_.assign(1, 0);
-    near_.reserve(n * kNeighbours);
+    near_.reserve(n * kNeighbors);
     std::vector<std::pair<float, std::int32_t>> found;
     for (std::size_t i = 0; i < n; ++i) {
       found.clear();
       collect(i, found);
-      const std::size_t kept = std::min(kNeighbours, found.size());
+      const std::size_t kept = std::min(kNeighbors, found.size());
       std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end());
       for (std::size_t k = 0; k < kept; ++k)
         near_.push_back({found[k].second, cost(static_cast<std::int32_t>(i), found[k].second)});
@@ -123,7 +123,7 @@ class Neighbours {
   std::vector<std::int32_t> order_;  ///< dots by cell
   std::vector<std::int64_t> keys_;   ///< of the cells of order_
   std::vector<std::size_t> first_;
-  std::vector<Neighbour> near_;
+  std::vector<Neighbor> near_;
 };
 
 /// The path as an array of dots, and its local improvement. Whatever is done to the path is done by reversing stretches
@@ -132,7 +132,7 @@ class LocalSearch {
  public:
   LocalSearch(const CellDescription& cell, std::span<const PathDot> path)
       : cost_(cell, path),
-        neighbours_(path, cost_),
+        neighbors_(path, cost_),
         dot_at_(path.size()),
         place_of_(path.size()),
         is_queued_(path.size(), false) {
@@ -145,9 +145,9 @@ class LocalSearch {
     settle(40 * dot_at_.size());  // a bound; a few looks at each dot are usual
   }
 
-  /// Swaps neighbouring stretches here and there, descends from there, and keeps what is no worse.
+  /// Swaps neighboring stretches here and there, descends from there, and keeps what is no worse.
   void perturb(std::size_t kicks) {
-    constexpr std::int64_t kLongest = 30;
+    constexpr std::int64_t kMax = 30;
     const auto count = static_cast<std::int64_t>(dot_at_.size());
     if (count < 8) return;
     window_ = kKickWindow;
@@ -159,12 +159,12 @@ class LocalSearch {
     for (std::size_t k = 0; k < kicks; ++k) {
       log_.clear();
       gained_s_ = 0;
-      const std::int64_t longest = std::min(kLongest, count / 3), first = below(count - 2);
+      const std::int64_t longest = std::min(kMax, count / 3), first = below(count - 2);
       const std::int64_t middle = std::min(first + 1 + below(longest), count - 1);
       const std::int64_t end = std::min(middle + 1 + below(longest), count);
       swap_stretches(first, middle, end);
       settle(1000);
-      if (gained_s_ >= -kLeastGainS) continue;
+      if (gained_s_ >= -kMinGainS) continue;
       is_logging_ = false;
       for (auto it = log_.rbegin(); it != log_.rend(); ++it) reverse(it->first, it->second);
       is_logging_ = true;
@@ -179,10 +179,10 @@ class LocalSearch {
     return place < 0 || place >= static_cast<std::int64_t>(dot_at_.size()) ? kNone
                                                                            : dot_at_[static_cast<std::size_t>(place)];
   }
-  /// Of an edge of the path, which mostly joins neighbours.
+  /// Of an edge of the path, which mostly joins neighbors.
   float edge_s(std::int32_t a, std::int32_t b) const {
     if (a == kNone || b == kNone) return 0;
-    for (const Neighbour& near : neighbours_.of(a))
+    for (const Neighbor& near : neighbors_.of(a))
       if (near.dot == b) return near.step_s;
     return cost_(a, b);
   }
@@ -205,17 +205,17 @@ class LocalSearch {
     queue_.clear();
   }
 
-  /// Replaces the edge from `a` to its successor (or predecessor) and one at a neighbour.
+  /// Replaces the edge from `a` to its successor (or predecessor) and one at a neighbor.
   bool two_opt(std::int32_t a) {
     for (const std::int64_t side : {1, -1}) {
       const std::int32_t b = at(place(a) + side);
       const float old_s = edge_s(a, b);
-      for (const auto& [c, new_s] : neighbours_.of(a)) {
+      for (const auto& [c, new_s] : neighbors_.of(a)) {
         if (new_s >= old_s) continue;
         const std::int32_t d = at(place(c) + side);
         const float saved_s = old_s + edge_s(c, d) - new_s;
         const float gain_s = saved_s - cost_(b, d, saved_s);
-        if (gain_s <= kLeastGainS) continue;
+        if (gain_s <= kMinGainS) continue;
         const std::int64_t first = side > 0 ? std::min(place(a), place(c)) + 1 : std::min(place(a), place(c));
         const std::int64_t last = side > 0 ? std::max(place(a), place(c)) : std::max(place(a), place(c)) - 1;
         if (last - first >= window_) continue;
@@ -228,7 +228,7 @@ class LocalSearch {
     return false;
   }
 
-  /// Moves one to three dots that begin or end with `a` next to a neighbour of `a`.
+  /// Moves one to three dots that begin or end with `a` next to a neighbor of `a`.
   bool move_segment(std::int32_t a) {
     for (const std::int64_t side : {1, -1})
       for (std::int64_t length = side > 0 ? 1 : 2; length <= 3; ++length) {
@@ -242,8 +242,8 @@ class LocalSearch {
   bool move_segment(std::int32_t a, std::int32_t e, std::int64_t side, std::int64_t length) {
     const std::int32_t before = at(place(a) - side), after = at(place(e) + side);
     const float old_s = edge_s(before, a) + edge_s(e, after), removed_s = old_s - cost_(before, after, old_s);
-    if (removed_s <= kLeastGainS) return false;
-    for (const auto& [c, joint_s] : neighbours_.of(a)) {
+    if (removed_s <= kMinGainS) return false;
+    for (const auto& [c, joint_s] : neighbors_.of(a)) {
       if (joint_s >= removed_s) continue;
       const std::int64_t offset = (place(c) - place(a)) * side;
       if ((offset >= 0 && offset < length) || std::abs(offset) >= window_) continue;
@@ -251,7 +251,7 @@ class LocalSearch {
         const std::int32_t d = at(place(c) + beyond);
         if (d == a || d == e) continue;  // the edge that is taken away
         const float saved_s = removed_s + edge_s(c, d) - joint_s, gain_s = saved_s - cost_(e, d, saved_s);
-        if (gain_s <= kLeastGainS) continue;
+        if (gain_s <= kMinGainS) continue;
         insert(a, e, c, beyond);
         gained_s_ += gain_s;
         for (const std::int32_t end : {a, e, before, after, c, d}) queue_again(end);
@@ -301,7 +301,7 @@ class LocalSearch {
   }
 
   PathCost cost_;
-  Neighbours neighbours_;
+  Neighbors neighbors_;
   std::vector<std::int32_t> dot_at_, place_of_;
   std::vector<bool> is_queued_;
   std::vector<std::int32_t> queue_;

@@ -6,9 +6,9 @@
 #include "planner/poses/step_cost.h"
 
 /// The order of dots that are exposed from one pose of the table: an open path, first as the curve has it, then
-/// improved locally by 2-opt and Or-opt over near neighbours. A step costs what the cell takes for it: the slowest axis
+/// improved locally by 2-opt and Or-opt over near neighbors. A step costs what the cell takes for it: the slowest axis
 /// in whole ticks, and settling. So rows that suit the arm come out where it is cheaper one way than the other.
-/// After Croes 1958, Or 1976, Bentley 1992 (neighbour lists, don't-look bits); differs: moves are not longer than a
+/// After Croes 1958, Or 1976, Bentley 1992 (neighbor lists, don't-look bits); differs: moves are not longer than a
 /// window, so that cost and memory are linear.
 namespace hilbrush {
 
@@ -19,7 +19,7 @@ struct PathDot {
   ArmJoints per_yaw{};  ///< how the joints follow the yaw; zero: the tool does not turn
 };
 
-/// Which dot comes at which place, ends free. `kicks` a dot: so often a neighbourhood is disturbed and improved again
+/// Which dot comes at which place, ends free. `kicks` a dot: so often a neighborhood is disturbed and improved again
 /// (iterated local search, Martin, Otto and Felten 1991), which is worth half a per cent of the painting time.
 /// Cost O(n), about 5 microseconds a dot and 20 a kick; memory about 100 bytes a dot.
 std::vector<std::uint32_t> improved_order(const CellDescription& cell, std::span<const PathDot> path,

@@ -42,9 +42,9 @@ void remove_misfits(const AimedDots& dots, std::vector<Tour>& tours, std::vector
 }
 
 /// C and J4 by the shortest way from the tour before. Returns where the axes stand at the tour's first dot.
-Joints wind(const Reach::Implementation& reach, const Eigen::Vector3d& first_O, const Joints& before,
-            Station& station) {
-  station.rotation = reach.kinematics.wind(kRotation, station.rotation, before[kRotation]);
+Joints unwrap_near(const Reach::Implementation& reach, const Eigen::Vector3d& first_O, const Joints& before,
+                   Station& station) {
+  station.rotation = reach.kinematics.unwrap_near(kRotation, station.rotation, before[kRotation]);
   // J4 keeps clear of its ends, so that it need not unwind within the tour.
   const double middle = (reach.kinematics.axis_min(kJ4) + reach.kinematics.axis_max(kJ4)) / 2;
   const double half =
@@ -119,7 +119,7 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   std::vector<Joints> first(tours.size());
   Joints before = home_joints(reach.cell);
   for (std::size_t t = 0; t < tours.size(); ++t)
-    first[t] = before = wind(reach, aimed.position_O(tours[t].dots.front()), before, tours[t].station);
+    first[t] = before = unwrap_near(reach, aimed.position_O(tours[t].dots.front()), before, tours[t].station);
   std::vector<std::vector<PosedDot>> parts(tours.size());
   for (std::size_t begin = 0; begin < tours.size(); begin += kToursAtOnce) {
     const std::size_t end = std::min(tours.size(), begin + kToursAtOnce);

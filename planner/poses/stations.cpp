@@ -180,7 +180,7 @@ class StationChoice {
 
   /// 2-opt and moving single tours, until nothing improves.
   void exchange() {
-    constexpr double kLeastStationGainS = 1e-5;
+    constexpr double kMinStationGainS = 1e-5;
     constexpr int kPassesAtMost = 60;
     const std::size_t n = order_.size();
     bool is_improved = true;
@@ -190,12 +190,12 @@ class StationChoice {
         for (std::size_t j = i + 1; j <= n; ++j) {
           const double gain = distance_s(at(i - 1), at(i)) + distance_s(at(j), at(j + 1)) -
                               distance_s(at(i - 1), at(j)) - distance_s(at(i), at(j + 1));
-          if (gain <= kLeastStationGainS) continue;
+          if (gain <= kMinStationGainS) continue;
           std::reverse(order_.begin() + static_cast<std::ptrdiff_t>(i - 1),
                        order_.begin() + static_cast<std::ptrdiff_t>(j));
           is_improved = true;
         }
-      for (std::size_t i = 1; i <= n; ++i) is_improved |= move_tour(i, kLeastStationGainS);
+      for (std::size_t i = 1; i <= n; ++i) is_improved |= move_tour(i, kMinStationGainS);
     }
   }
 

@@ -14,7 +14,7 @@ namespace {
 /// found.
 constexpr double kIncidenceSlack = 4 * std::numbers::pi / 180;
 constexpr std::size_t kAtOnce = 512;  // between two words of progress
-constexpr std::size_t kMostAskedPoses = 48, kMostAskedDots = 1500;
+constexpr std::size_t kMaxAskedPoses = 48, kMaxAskedDots = 1500;
 /// A station that serves fewer of the dots asked is not looked for among their poses any more.
 constexpr std::size_t kFewServed = 2;
 
@@ -102,7 +102,7 @@ class Leftovers {
 
   /// Of the poses of some dots all along the curve, the one that serves most of some dots all along it.
   std::pair<std::size_t, std::size_t> most_serving() const {
-    const std::size_t n = left_.size(), poses = std::min(n, kMostAskedPoses), asked = std::min(n, kMostAskedDots);
+    const std::size_t n = left_.size(), poses = std::min(n, kMaxAskedPoses), asked = std::min(n, kMaxAskedDots);
     std::vector<std::size_t> served(poses, 0);
     tbb::parallel_for(std::size_t{0}, poses, [&](std::size_t p) {
       const Station& station = left_[p * n / poses].station;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kWidest = 8 * kDegree;  // that the tool turns away from the station's yaw
 constexpr int kFinePerCoarse = 4;
-constexpr int kMostToOneSide = 127;   // what back-pointers of a byte tell apart
+constexpr int kMaxToOneSide = 127;    // what back-pointers of a byte tell apart
 constexpr std::size_t kBlock = 8192;  // dots whose yaws are chosen together
 constexpr float kNever = std::numeric_limits<float>::infinity();
 
@@ -42,7 +42,7 @@ class YawPath {
   /// First roughly, as far as the tool may turn; then in small steps around that.
   void improve() {
     const double coarse = one_tick_turn(), fine = coarse / kFinePerCoarse;
-    const YawGrid coarse_grid{coarse, std::min(kMostToOneSide, static_cast<int>(kWidest / coarse)), 4};
+    const YawGrid coarse_grid{coarse, std::min(kMaxToOneSide, static_cast<int>(kWidest / coarse)), 4};
     const YawGrid fine_grid{fine, 12, 8};
     for (std::size_t i = 0; i < tour_.size(); ++i) clear_.push_back({clear_turn(i, -1), clear_turn(i, 1)});
     choose(coarse_grid);
@@ -115,7 +115,7 @@ class YawPath {
     joints = joints_[i];
     if (!reach_.kinematics.solve_arm(table_.to_W(dots_.position_O(tour_[i])), yaw, station_.elbow, joints))
       return false;
-    joints[kJ4] = reach_.kinematics.wind(kJ4, joints[kJ4], joints_[i][kJ4]);
+    joints[kJ4] = reach_.kinematics.unwrap_near(kJ4, joints[kJ4], joints_[i][kJ4]);
     return true;
   }
 

@@ -180,19 +180,19 @@ bool Clearance::keeps_margin(const BallRow& row) const {
   return true;
 }
 
-void Clearance::lessen(const Eigen::Vector3d& ball_O, double radius_m, Slack& slack) const {
+void Clearance::reduce_clearance(const Eigen::Vector3d& ball_O, double radius_m, Slack& slack) const {
   slack.object_m = std::min(slack.object_m, distance_(ball_O) - radius_m - distance_.error_m(radius_m));
   slack.table_m = std::min(slack.table_m, table_distance_m(ball_O) - radius_m);
 }
 
-void Clearance::lessen(const BallRow& row, Slack& slack) const {
+void Clearance::reduce_clearance(const BallRow& row, Slack& slack) const {
   if (is_far(row, kSlackMaxM)) return;
-  for (int i = 0; i < row.count; ++i) lessen(row.first_O + i * row.step_O, row.ball_m, slack);
+  for (int i = 0; i < row.count; ++i) reduce_clearance(row.first_O + i * row.step_O, row.ball_m, slack);
 }
 
 Clearance::Slack Clearance::lens_slack(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
   Slack slack;
-  lessen(lens_row(focus_O, beam_O, cell_.lens.radius_m / 3, cell_.lens.near_m), slack);
+  reduce_clearance(lens_row(focus_O, beam_O, cell_.lens.radius_m / 3, cell_.lens.near_m), slack);
   return slack;
 }
 
@@ -201,27 +201,27 @@ Clearance::Slack Clearance::lens_slack_fine(const Eigen::Vector3d& focus_O, cons
   Slack slack;
   const auto& lens = cell_.lens;
   // 19 balls of .4 radius in two rings cover the end disc and the slice of .4 radius behind it: .2 above and below
-  // their centres they still are discs of .346 radius, and 19 discs of .275 radius would do.
+  // their centers they still are discs of .346 radius, and 19 discs of .275 radius would do.
   const double ball_m = .4 * lens.radius_m, depth_m = .2 * lens.radius_m;
   const double front_m = lens.near_m + depth_m;
   const Eigen::Vector3d u = beam_O.unitOrthogonal(), v = beam_O.cross(u);
   for (int layer = 0; layer < 2; ++layer) {
     const Eigen::Vector3d center = focus_O - (front_m + layer * 2 * depth_m) * beam_O;
-    lessen(center, ball_m, slack);
+    reduce_clearance(center, ball_m, slack);
     for (const auto& [count, ring] : {std::pair{6, .50}, std::pair{12, .83}})
       for (int i = 0; i < count; ++i) {
         const double angle = 2 * std::numbers::pi * i / count;
-        lessen(center + ring * lens.radius_m * (std::cos(angle) * u + std::sin(angle) * v), ball_m, slack);
+        reduce_clearance(center + ring * lens.radius_m * (std::cos(angle) * u + std::sin(angle) * v), ball_m, slack);
       }
   }
   const double behind_m = lens.near_m + 4 * depth_m;
-  if (behind_m < lens.far_m) lessen(lens_row(focus_O, beam_O, lens.radius_m / 6, behind_m), slack);
+  if (behind_m < lens.far_m) reduce_clearance(lens_row(focus_O, beam_O, lens.radius_m / 6, behind_m), slack);
   return slack;
 }
 
 Clearance::Slack Clearance::quill_slack(const ToolPose& tool) const {
   Slack slack;
-  lessen(quill_row(tool), slack);
+  reduce_clearance(quill_row(tool), slack);
   return slack;
 }
 
@@ -229,22 +229,22 @@ Clearance::Slack Clearance::links_slack(const TablePose& table, const Joints& jo
   Slack slack;
   if (!links_may_touch_) return slack;
   for (const Capsule& link_W : arm_links_W(cell_.arm, joints)) {
-    if (link_W.radius_m > 0) lessen(link_W.in_O(table), slack);
+    if (link_W.radius_m > 0) reduce_clearance(link_W.in_O(table), slack);
   }
   return slack;
 }
 
 Clearance::Slack Clearance::column_slack(const TablePose& table) const {
   Slack slack;
-  if (column_may_touch_) lessen(column_capsule_W(cell_.arm).in_O(table), slack);
+  if (column_may_touch_) reduce_clearance(column_capsule_W(cell_.arm).in_O(table), slack);
   return slack;
 }
 
-void Clearance::lessen(const Capsule& capsule_O, Slack& slack) const {
+void Clearance::reduce_clearance(const Capsule& capsule_O, Slack& slack) const {
   const double length_m = std::max((capsule_O.to - capsule_O.from).norm(), 1e-6);
-  lessen(cover(capsule_O.from, (capsule_O.to - capsule_O.from) / length_m, length_m, capsule_O.radius_m,
-               .3 * capsule_O.radius_m),
-         slack);
+  reduce_clearance(cover(capsule_O.from, (capsule_O.to - capsule_O.from) / length_m, length_m, capsule_O.radius_m,
+                         .3 * capsule_O.radius_m),
+                   slack);
 }
 
 /// Lens, quill and forearm against the column; the upper arm stands on it.

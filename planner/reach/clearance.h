@@ -94,8 +94,8 @@ class Clearance {
   bool is_far(const BallRow& row, double margin_m) const;
   /// Whether a whole row keeps the margin; slices inside a free ball are passed over.
   bool keeps_margin(const BallRow& row) const;
-  void lessen(const BallRow& row, Slack& slack) const;
-  void lessen(const Eigen::Vector3d& ball_O, double radius_m, Slack& slack) const;
+  void reduce_clearance(const BallRow& row, Slack& slack) const;
+  void reduce_clearance(const Eigen::Vector3d& ball_O, double radius_m, Slack& slack) const;
   Slack lens_slack(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   Slack lens_slack_fine(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   Slack quill_slack(const ToolPose& tool) const;
@@ -103,7 +103,7 @@ class Clearance {
   double link_lens_gap_m(const Joints& joints) const;
   Slack column_slack(const TablePose& table) const;
   double column_tool_gap_m(const Joints& joints) const;
-  void lessen(const Capsule& capsule_O, Slack& slack) const;
+  void reduce_clearance(const Capsule& capsule_O, Slack& slack) const;
   /// Whether anything at all is left to be looked at by links_obstruction().
   bool arm_may_touch() const { return links_may_touch_ || links_may_touch_lens_ || cell_.arm.column.radius_m > 0; }
   double table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
@@ -116,7 +116,7 @@ class Clearance {
   bool links_may_touch_ = false, links_may_touch_lens_ = false;
   bool column_may_touch_ = false;  ///< ... the object or the table
   double tool_radius_m_;           ///< horizontally, of all that goes with the flange, around its axis
-  /// The ball around object, post and plate; its centre is on the axis of C.
+  /// The ball around object, post and plate; its center is on the axis of C.
   double ball_height_m_, ball_radius_m_;
   ObjectRays rays_;
   ObjectDistance distance_;

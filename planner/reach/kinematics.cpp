@@ -63,16 +63,16 @@ ToolPose Kinematics::tool_pose(const Joints& joints) const {
 }
 
 bool Kinematics::solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elbow, Joints& joints,
-                           double* rim_excess_m) const {
+                           double* boundary_excess_m) const {
   const auto& arm = cell_.arm;
   const Eigen::Vector3d flange_W = focus_W - arm.flange_to_focus_m * beam_W(yaw);
   const double distance2 = flange_W.head<2>().squaredNorm();
   const double l1 = arm.upper_arm_m, l2 = arm.forearm_m;
   const double cos_j2 = (distance2 - l1 * l1 - l2 * l2) / (2 * l1 * l2);
   if (!(std::abs(cos_j2) < 1)) {
-    if (rim_excess_m) {
+    if (boundary_excess_m) {
       const double distance = std::sqrt(distance2);
-      *rim_excess_m = std::max(distance - (l1 + l2), std::abs(l1 - l2) - distance);
+      *boundary_excess_m = std::max(distance - (l1 + l2), std::abs(l1 - l2) - distance);
     }
     return false;
   }
@@ -115,7 +115,7 @@ LimitExcess Kinematics::limit_excess(const Joints& joints) const {
   return worst;
 }
 
-double Kinematics::wind(int axis, double angle, double reference) const {
+double Kinematics::unwrap_near(int axis, double angle, double reference) const {
   const double low = axis_min(axis), high = axis_max(axis);
   const double nearest = angle + kTurn * std::round((reference - angle) / kTurn);
   if (nearest >= low && nearest <= high) return nearest;

@@ -4,7 +4,8 @@
 #include "planner/cell_model/cell_description.h"
 
 /// Closed-form kinematics of the cell, in the coordinates that planning searches: tilt A, rotation C, and yaw = J1 + J2
-/// + J4. Frames as in cell_description.h. No singularities but the arm's outer and inner rim, which solve_arm refuses.
+/// + J4. Frames as in cell_description.h. No singularities but the arm's outer and inner workspace_boundary, which
+/// solve_arm refuses.
 namespace hilbrush {
 
 /// The table at one (A, C): where the object is.
@@ -47,10 +48,10 @@ class Kinematics {
   double yaw(const Joints& joints) const { return joints[kJ1] + joints[kJ2] + joints[kJ4]; }
 
   /// J1..J4 that bring the focus to `focus_W` at `yaw`; J4 in [-pi, pi]. False if the flange is out of the arm's
-  /// annulus; then `rim_excess_m` (optional) says by how much. Limits are not looked at. 1 ulp-accurate chains: FK(IK)
-  /// < 1e-12 m.
+  /// annulus; then `boundary_excess_m` (optional) says by how much. Limits are not looked at. 1 ulp-accurate chains:
+  /// FK(IK) < 1e-12 m.
   bool solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elbow, Joints& joints,
-                 double* rim_excess_m = nullptr) const;
+                 double* boundary_excess_m = nullptr) const;
 
   /// How the joints follow the yaw while the focus stays where it is, rad/rad: J1, J2 and J4; zero for the others.
   /// Without end at the straight arm.
@@ -64,7 +65,7 @@ class Kinematics {
 
   /// `angle` plus the whole turns that bring it nearest to `reference` within the axis's limits. The angle itself if no
   /// winding fits.
-  double wind(int axis, double angle, double reference) const;
+  double unwrap_near(int axis, double angle, double reference) const;
 
   double cos_depression() const { return cos_e_; }
   double sin_depression() const { return sin_e_; }

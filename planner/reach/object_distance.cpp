@@ -45,7 +45,7 @@ std::vector<Eigen::Vector3f> ObjectDistance::surface_points(const TexturedMesh& 
   return points;
 }
 
-/// Each node learns its nearest point from its neighbours: first those around each point, then by scans to and fro.
+/// Each node learns its nearest point from its neighbors: first those around each point, then by scans to and fro.
 void ObjectDistance::spread(const std::vector<Eigen::Vector3f>& points) {
   const std::size_t node_count = index(0, 0, size_.z());
   std::vector<std::uint32_t> nearest(node_count, kNobody);

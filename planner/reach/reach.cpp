@@ -78,12 +78,12 @@ Reach::Implementation::Implementation(const TexturedMesh& mesh, const CellDescri
 
 bool Reach::Implementation::arm_fits(const TablePose& table, const Eigen::Vector3d& position_O, double yaw, Elbow elbow,
                                      const Joints& reference, Joints& joints, FailureTally* tally) const {
-  double rim_excess_m = 0;
-  if (!kinematics.solve_arm(table.to_W(position_O), yaw, elbow, joints, &rim_excess_m)) {
-    if (tally) tally->rim(rim_excess_m);
+  double boundary_excess_m = 0;
+  if (!kinematics.solve_arm(table.to_W(position_O), yaw, elbow, joints, &boundary_excess_m)) {
+    if (tally) tally->workspace_boundary(boundary_excess_m);
     return false;
   }
-  joints[kJ4] = kinematics.wind(kJ4, joints[kJ4], reference[kJ4]);
+  joints[kJ4] = kinematics.unwrap_near(kJ4, joints[kJ4], reference[kJ4]);
   joints[kTilt] = table.tilt;
   joints[kRotation] = table.rotation;
   const LimitExcess excess = kinematics.limit_excess(joints);
@@ -111,7 +111,8 @@ std::optional<DotPose> Reach::Implementation::pose_for_beam(const Target& target
     for (int i = 0; i < count; ++i) {
       has_tilt = true;
       DotPose pose;
-      pose.table = kinematics.table_pose(tilt, kinematics.wind(kRotation, solutions[i].rotation, reference[kRotation]));
+      pose.table =
+          kinematics.table_pose(tilt, kinematics.unwrap_near(kRotation, solutions[i].rotation, reference[kRotation]));
       pose.yaw = solutions[i].yaw;
       for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
         if (!arm_fits(pose.table, target.position_O, pose.yaw, elbow, reference, pose.joints, tally)) continue;

@@ -13,7 +13,7 @@ struct DotPose {
   TablePose table;
   double yaw = 0;
   Elbow elbow = Elbow::kPositive;
-  Joints joints{};         ///< J4 and C wound nearest to the reference
+  Joints joints{};         ///< J4 and C unwrapped nearest to the reference
   double from_smooth = 0;  ///< rad, between the beam and the smooth normal
 };
 

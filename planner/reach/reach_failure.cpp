@@ -116,7 +116,7 @@ void FailureTally::no_tilt(double excess) {
   if (is_better(kTable, excess)) amount_ = excess;
 }
 
-void FailureTally::rim(double excess_m) {
+void FailureTally::workspace_boundary(double excess_m) {
   // An arm that is too short fails before any limit: whoever fails a limit came farther.
   if (is_better(kLimit, 10 + excess_m)) axis_ = kAxisCount, amount_ = excess_m;
 }
@@ -148,7 +148,7 @@ bool FailureTally::is_nearly_reached() const {
 }
 
 void FailureTally::tell(SkippedDot& skipped) const {
-  const auto millimetres = [this] { return number(amount_ * 1e3) + " mm"; };
+  const auto millimeters = [this] { return number(amount_ * 1e3) + " mm"; };
   const auto degrees = [this] { return number(amount_ / kDegree) + " degrees"; };
   skipped.amount = amount_;
   skipped.is_angle = false;
@@ -161,21 +161,21 @@ void FailureTally::tell(SkippedDot& skipped) const {
     skipped.reason = SkipReason::kJointLimit;
     if (axis_ == kAxisCount) {
       skipped.what = "out of the arm's reach";
-      skipped.detail = millimetres() + " out of the arm's reach";
+      skipped.detail = millimeters() + " out of the arm's reach";
       return;
     }
     const auto axis = static_cast<std::size_t>(axis_);
     skipped.what = kPastLimit[axis];
     skipped.is_angle = axis_ != kJ3;
     skipped.detail =
-        std::string(kAxisWords[axis]) + " " + (skipped.is_angle ? degrees() : millimetres()) + " past its limit";
+        std::string(kAxisWords[axis]) + " " + (skipped.is_angle ? degrees() : millimeters()) + " past its limit";
   } else {
     const Excuse excuse = excuse_of(what_);
     skipped.reason = excuse.reason;
     skipped.what = excuse.what;
     skipped.detail = excuse.what;
-    if (stage_ == kBeam) skipped.detail += " " + millimetres() + " from the dot";
-    if (stage_ > kLimit || stage_ == kLens) skipped.detail += ", " + millimetres() + " too near";
+    if (stage_ == kBeam) skipped.detail += " " + millimeters() + " from the dot";
+    if (stage_ > kLimit || stage_ == kLens) skipped.detail += ", " + millimeters() + " too near";
   }
 }
 

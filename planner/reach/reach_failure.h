@@ -14,7 +14,7 @@ class FailureTally {
   /// No tilt within its limits turns the dot to the beam; the nearest one is `excess` (rad) past them.
   void no_tilt(double excess);
   void limit(const LimitExcess& excess);
-  void rim(double excess_m);
+  void workspace_boundary(double excess_m);
   void quill(const Shortfall& shortfall);
   void links(const Shortfall& shortfall);
 

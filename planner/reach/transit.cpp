@@ -10,9 +10,9 @@ namespace hilbrush {
 namespace {
 
 /// Nearer than this the tool does not come while it moves.
-constexpr double kLeastSlackM = .4e-3;
+constexpr double kMinSlackM = .4e-3;
 /// ... unless it starts nearer, because it was stopped there: then it may leave.
-constexpr double kLeastSlackOfEscapeM = .05e-3;
+constexpr double kMinSlackOfEscapeM = .05e-3;
 constexpr double kBackOffsM[] = {.005, .01, .02, .03, .045, .06, .08, .1};
 
 /// Distance covered `time_s` into a move over `distance` from rest to rest.
@@ -74,11 +74,11 @@ double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
 
 double Transit::least_slack_m(const Joints& from) const {
   const double slack_m = reach_.clearance.slack_m(reach_.kinematics, from);
-  return std::clamp(.5 * slack_m, kLeastSlackOfEscapeM, kLeastSlackM);
+  return std::clamp(.5 * slack_m, kMinSlackOfEscapeM, kMinSlackM);
 }
 
 bool Transit::is_clear_at(const Joints& joints) const {
-  return reach_.clearance.slack_m(reach_.kinematics, joints) >= kLeastSlackM;
+  return reach_.clearance.slack_m(reach_.kinematics, joints) >= kMinSlackM;
 }
 
 bool Transit::is_clear(const Joints& from, const Joints& to) const {
@@ -86,7 +86,7 @@ bool Transit::is_clear(const Joints& from, const Joints& to) const {
   const auto slack_at = [&](const Joints& joints) { return reach_.clearance.slack_m(reach_.kinematics, joints); };
   double slack_m = slack_at(from);
   if (travel_bound_m(from, to) <= slack_m) return true;
-  if (slack_at(to) < kLeastSlackM) return false;
+  if (slack_at(to) < kMinSlackM) return false;
 
   double end_s = 0;
   for (std::size_t i = 0; i < kAxisCount; ++i)
@@ -125,7 +125,7 @@ std::optional<Joints> Transit::backed_off(const Joints& joints, double distance_
   for (double back_m = distance_m; back_m > .003; back_m *= .7) {
     Joints back = joints;
     if (!kinematics.solve_arm(focus_W - back_m * beam_W, yaw, elbow_of(joints), back)) continue;
-    back[kJ4] = kinematics.wind(kJ4, back[kJ4], joints[kJ4]);
+    back[kJ4] = kinematics.unwrap_near(kJ4, back[kJ4], joints[kJ4]);
     // Near J4's limit the same direction may only be found a turn away.
     if (kinematics.limit_excess(back).is_inside() && !needs_retract(joints, back)) return back;
   }

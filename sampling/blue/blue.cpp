@@ -25,44 +25,44 @@ constexpr int kChoiceSweeps = 3, kNewtonSweeps = 3;
 /// is flat on top, leaves a few such pairs in 100,000.
 constexpr double kNearest = .58;
 /// A place that is farther from all dots, in spacings, draws that of its stratum: most holes of the kernel's choice lie
-/// on the border, where no neighbour is on the other side to be pushed back by.
+/// on the border, where no neighbor is on the other side to be pushed back by.
 constexpr double kFarthest = .78;
 constexpr int kEveningRounds = 3;
-/// Who leaves one neighbour may come too near to another, and the last word is theirs.
+/// Who leaves one neighbor may come too near to another, and the last word is theirs.
 constexpr int kLastPushes = 3;
 constexpr int kSweeps = kChoiceSweeps + kNewtonSweeps + 2 * kEveningRounds + kLastPushes;
 /// Border within so many spacings of a place is looked at.
 constexpr double kToBorder = .4;
 /// How far Newton steps may take a dot from the place that was chosen, and a single one, in spacings.
-constexpr double kLongestWay = .25, kLongestStep = .15;
+constexpr double kMaxWay = .25, kMaxStep = .15;
 /// Dots whose spacings differ by more do not see each other: what they would push, the surface around them would pull.
-constexpr double kMostUnequal = 4;
-/// Distance of neighbours in the densest packing, at unit area a dot: sqrt(2 / sqrt(3)).
+constexpr double kMaxUnequal = 4;
+/// Distance of neighbors in the densest packing, at unit area a dot: sqrt(2 / sqrt(3)).
 constexpr double kDensestSpacing = 1.0745699318235418;
 
 /// What a single dot reaches at most: two dots see each other only if the distance of their strata is less than the
 /// sum.
 double reach_of(const PlacedStratum& stratum) {
   // The kernel of two dots that are as unequal as may be reaches furthest beyond the sum of equal ones.
-  static const double kMostReach =
-      std::sqrt(static_cast<double>(PairKernel(1., kMostUnequal).support2)) / (1 + kMostUnequal);
-  return stratum.radius_m + kMostReach * stratum.spacing_m;
+  static const double kMaxReach =
+      std::sqrt(static_cast<double>(PairKernel(1., kMaxUnequal).support2)) / (1 + kMaxUnequal);
+  return stratum.radius_m + kMaxReach * stratum.spacing_m;
 }
 
 /// Strata see each other if they face the same way, or hang together over a fold; not through a wall.
-IndexLists find_neighbours(const SurfaceCurve& curve, const PlacedStrata& strata) {
+IndexLists find_neighbors(const SurfaceCurve& curve, const PlacedStrata& strata) {
   std::vector<SizedBall> balls;
   balls.reserve(strata.strata.size());
   for (const PlacedStratum& stratum : strata.strata) balls.push_back({stratum.middle_O, reach_of(stratum)});
   tbb::enumerable_thread_specific<GrowingBall> growing_balls(
-      [&] { return GrowingBall(curve.mesh(), curve.implementation().neighbours); });
+      [&] { return GrowingBall(curve.mesh(), curve.implementation().neighbors); });
   const auto first_place = [&](std::uint32_t i) -> const SurfacePlace& {
     return strata.place(i, static_cast<std::size_t>(std::countr_zero(strata.strata[i].open_places)));
   };
   return find_touching_balls(balls, [&](std::uint32_t i, std::uint32_t j) {
     const PlacedStratum &a = strata.strata[i], &b = strata.strata[j];
     const double ratio = a.spacing_m / b.spacing_m;
-    if (!(ratio < kMostUnequal && ratio * kMostUnequal > 1)) return false;
+    if (!(ratio < kMaxUnequal && ratio * kMaxUnequal > 1)) return false;
     const double reach =
         static_cast<double>(std::sqrt(PairKernel(a.spacing_m, b.spacing_m).support2)) + a.radius_m + b.radius_m;
     if (!((a.middle_O - b.middle_O).squaredNorm() < reach * reach)) return false;
@@ -80,8 +80,8 @@ class Relaxation {
       : curve_(curve),
         tone_(tone),
         strata_(strata),
-        neighbours_(find_neighbours(curve, strata)),
-        colouring_(colour_stretches(neighbours_)),
+        neighbors_(find_neighbors(curve, strata)),
+        coloring_(color_stretches(neighbors_)),
         pulls_(strata.strata.size()),
         dots_(strata.strata.size()) {
     tbb::parallel_for(std::size_t{0}, dots_.size(), [&](std::size_t i) {
@@ -153,13 +153,13 @@ class Relaxation {
   PlaceSums::Sums pull_of_places(std::size_t i) const {
     PlaceSums sum(strata_, i);
     add_pulls(sum, kernel_of(i, i), i);
-    for (const std::uint32_t j : neighbours_[i]) add_pulls(sum, kernel_of(i, j), j);
+    for (const std::uint32_t j : neighbors_[i]) add_pulls(sum, kernel_of(i, j), j);
     return sum.sums();
   }
 
   void choose_place(std::size_t i, const PlaceSums::Sums& pull) {
     PlaceSums sum(strata_, i);
-    for (const std::uint32_t j : neighbours_[i]) sum.add(kernel_of(i, j), dots_[j].position_O, 1);
+    for (const std::uint32_t j : neighbors_[i]) sum.add(kernel_of(i, j), dots_[j].position_O, 1);
     const PlaceSums::Sums energy = sum.sums() + pull;
     float least = std::numeric_limits<float>::infinity();
     for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
@@ -174,10 +174,10 @@ class Relaxation {
     const Eigen::Matrix3d axes = frame_about(strata_.strata[i].normal_O);
     TangentSlope slope(here_O, axes.col(0), axes.col(1));
     add_pulls(slope, kernel_of(i, i), i);
-    for (const std::uint32_t j : neighbours_[i]) {
+    for (const std::uint32_t j : neighbors_[i]) {
       const PairKernel kernel = kernel_of(i, j);
       slope.add(kernel, dots_[j].position_O);
-      // Many a neighbour's surface is out of reach of this one place of the stratum.
+      // Many a neighbor's surface is out of reach of this one place of the stratum.
       const double reach = static_cast<double>(std::sqrt(kernel.support2)) + strata_.strata[j].radius_m;
       if ((strata_.strata[j].middle_O - here_O).squaredNorm() < reach * reach) add_pulls(slope, kernel, j);
     }
@@ -185,9 +185,9 @@ class Relaxation {
     // Curvatures below a third of a single kernel's are no guide to how far the valley is.
     const auto least = static_cast<float>(.15 / (static_cast<double>(PairKernel::kSigma2) * h * h));
     Vector3d offset = axes.leftCols<2>() * slope.newton_step(least).cast<double>();
-    offset *= std::min(1., kLongestStep * h / std::max(offset.norm(), 1e-300));
+    offset *= std::min(1., kMaxStep * h / std::max(offset.norm(), 1e-300));
     Vector3d from_home = here_O + offset - home_O;
-    from_home *= std::min(1., kLongestWay * h / std::max(from_home.norm(), 1e-300));
+    from_home *= std::min(1., kMaxWay * h / std::max(from_home.norm(), 1e-300));
     move_to(dots_[i], curve_, tone_, home_O + from_home);
   }
 
@@ -196,7 +196,7 @@ class Relaxation {
     const SurfaceCurve::Implementation& curve = curve_.implementation();
     const auto has_border = [](const auto& sides) { return std::ranges::find(sides, kNoSide) != sides.end(); };
     border_.resize(dots_.size());
-    if (std::ranges::none_of(curve.neighbours, has_border)) return;
+    if (std::ranges::none_of(curve.neighbors, has_border)) return;
     tbb::parallel_for(std::size_t{0}, dots_.size(), [&](std::size_t i) {
       const PlacedStratum& stratum = strata_.strata[i];
       for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
@@ -205,9 +205,9 @@ class Relaxation {
         const Vector3d outwards = (place.position_O - stratum.middle_O).normalized();
         const Vector3d across = stratum.normal_O.cross(outwards);
         for (const Vector3d& way : {outwards, across, Vector3d(-across)}) {
-          const SurfacePoint end = walk_towards(curve.mesh, curve.neighbours, {place.triangle, {}},
+          const SurfacePoint end = walk_towards(curve.mesh, curve.neighbors, {place.triangle, {}},
                                                 place.position_O + kToBorder * stratum.spacing_m * way);
-          const bool is_on_border = has_border(curve.neighbours[end.triangle]) && end.barycentric.minCoeff() <= 0;
+          const bool is_on_border = has_border(curve.neighbors[end.triangle]) && end.barycentric.minCoeff() <= 0;
           if (is_on_border) border_[i].push_back(position(curve.mesh, end));
         }
       }
@@ -223,7 +223,7 @@ class Relaxation {
     Vector3d hole_O = here_O;
     const auto look_at = [&](const Vector3d& place_O) {
       double nearest2 = (here_O - place_O).squaredNorm();
-      for (const std::uint32_t j : neighbours_[i]) {
+      for (const std::uint32_t j : neighbors_[i]) {
         if (nearest2 <= worst * worst) return;
         nearest2 = std::min(nearest2, (dots_[j].position_O - place_O).squaredNorm());
       }
@@ -242,7 +242,7 @@ class Relaxation {
     const Vector3d here_O = dots_[i].position_O;
     double worst = 0;
     Vector3d away = Vector3d::Zero();
-    for (const std::uint32_t j : neighbours_[i]) {
+    for (const std::uint32_t j : neighbors_[i]) {
       const double least =
           kNearest * kDensestSpacing * .5 * (strata_.strata[i].spacing_m + strata_.strata[j].spacing_m);
       const Vector3d way = here_O - dots_[j].position_O;
@@ -258,10 +258,10 @@ class Relaxation {
 
   template <class Visit>
   void visit_all(const Progress& progress, int sweep, Visit visit) {
-    for (const auto& stretches : colouring_.stretches)
+    for (const auto& stretches : coloring_.stretches)
       tbb::parallel_for(std::size_t{0}, stretches.size(), [&](std::size_t s) {
-        const std::size_t begin = stretches[s] * Colouring::kStretch;
-        for (std::size_t i = begin; i < std::min(begin + Colouring::kStretch, dots_.size()); ++i) visit(i);
+        const std::size_t begin = stretches[s] * Coloring::kStretch;
+        for (std::size_t i = begin; i < std::min(begin + Coloring::kStretch, dots_.size()); ++i) visit(i);
       });
     if (progress) progress(.5 + .5 * (sweep + 1) / kSweeps);
   }
@@ -269,8 +269,8 @@ class Relaxation {
   const SurfaceCurve& curve_;
   const ToneField& tone_;
   const PlacedStrata& strata_;
-  const IndexLists neighbours_;
-  const Colouring colouring_;
+  const IndexLists neighbors_;
+  const Coloring coloring_;
   std::vector<FourPulls> pulls_;  ///< where the surface of a stratum pulls from, and how strongly
   std::vector<std::vector<Vector3d>> border_;
   std::vector<SurfacePlace> dots_;

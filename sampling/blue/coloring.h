@@ -6,14 +6,14 @@
 
 namespace hilbrush {
 
-/// Stretches of consecutive dots, sorted into colours: stretches of one colour do not touch each other, so that
-/// different threads may move their dots at a time, and every dot still sees where its neighbours are now.
-struct Colouring {
+/// Stretches of consecutive dots, sorted into colors: stretches of one color do not touch each other, so that
+/// different threads may move their dots at a time, and every dot still sees where its neighbors are now.
+struct Coloring {
   static constexpr std::size_t kStretch = 128;
-  std::vector<std::vector<std::uint32_t>> stretches;  ///< by colour; stretch s holds dots s * kStretch on
+  std::vector<std::vector<std::uint32_t>> stretches;  ///< by color; stretch s holds dots s * kStretch on
 };
 
-/// Greedy, in order of the stretches. Cost O(neighbours).
-Colouring colour_stretches(const IndexLists& neighbours);
+/// Greedy, in order of the stretches. Cost O(neighbors).
+Coloring color_stretches(const IndexLists& neighbors);
 
 }  // namespace hilbrush

@@ -29,7 +29,7 @@ std::uint8_t open_places(const PlacedStrata& strata, std::size_t s, double spaci
 
 PlacedStratum measure(const PlacedStrata& strata, std::size_t s, const ToneField& tone, double dot_mass_m2) {
   // The mean over places of equal mass is weighted by mass: where a stratum has a dark and a light part it keeps to the
-  // dark one, where neighbours are near.
+  // dark one, where neighbors are near.
   double asked = 0;
   for (std::size_t p = 0; p < kPlacesAStratum; p += 2) {
     const SurfacePlace& place = strata.place(s, p);

@@ -33,7 +33,7 @@ class OctaveGrids {
       smallest_ = std::min(smallest_, ball.radius_m);
       largest = std::max(largest, ball.radius_m);
     }
-    last_octave_ = std::min(octave_of(largest), kMostOctaves - 1);
+    last_octave_ = std::min(octave_of(largest), kMaxOctaves - 1);
     entries_.resize(balls.size());
     tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
       entries_[i] = {key_of(octave_of(balls[i].radius_m), balls[i].center_O), static_cast<std::uint32_t>(i)};
@@ -65,11 +65,11 @@ class OctaveGrids {
   }
 
  private:
-  static constexpr int kMostOctaves = 64 - 3 * kCoordinateBits < 7 ? 1 << (64 - 3 * kCoordinateBits) : 128;
+  static constexpr int kMaxOctaves = 64 - 3 * kCoordinateBits < 7 ? 1 << (64 - 3 * kCoordinateBits) : 128;
   using Surrounding = std::pair<std::array<std::uint32_t, 27>, std::uint32_t>;
 
   int octave_of(double radius_m) const {
-    return std::clamp(static_cast<int>(std::ceil(std::log2(radius_m / smallest_) - 1e-9)), 0, kMostOctaves - 1);
+    return std::clamp(static_cast<int>(std::ceil(std::log2(radius_m / smallest_) - 1e-9)), 0, kMaxOctaves - 1);
   }
   /// Two balls of an octave that overlap lie in the same cube or in cubes that touch.
   double side_of(int octave) const { return 2 * smallest_ * std::ldexp(1., octave); }

@@ -16,7 +16,7 @@ constexpr std::size_t kProgressSteps = 16;
 /// Of the work, as told to the caller.
 constexpr double kFlattenShare = .7;
 
-std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbours& neighbours,
+std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbors& neighbors,
                                        const std::vector<Component>& components, const Progress& progress) {
   const double area = mesh.area_m2();
   std::vector<FlatComponent> flats(components.size());
@@ -25,7 +25,7 @@ std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbour
     for (std::size_t batch = 0; end < components.size() && batch * kProgressSteps <= mesh.triangle_count(); ++end)
       batch += components[end].triangles.size();
     tbb::parallel_for(begin, end, [&](std::size_t i) {
-      flats[i] = flatten(mesh, neighbours, components[i], components[i].area_m2 / area);
+      flats[i] = flatten(mesh, neighbors, components[i], components[i].area_m2 / area);
     });
     for (std::size_t i = begin; i < end; ++i) done += components[i].triangles.size();
     if (progress) progress(kFlattenShare * static_cast<double>(done) / static_cast<double>(mesh.triangle_count()));
@@ -56,32 +56,32 @@ ChainPiece chain_piece(const FlatPiece& piece, CurveKind kind) {
   return result;
 }
 
-Sheet sheet_on_square(const FlatPiece& piece, const Symmetry& symmetry, CurveKind kind) {
-  Sheet sheet;
-  sheet.kind = kind == CurveKind::kPeano2 ? SheetKind::kPeanoSquare : SheetKind::kHilbertSquare;
-  sheet.square_count = piece.square_count;
-  sheet.faces.reserve(piece.faces.size());
+Chart chart_on_square(const FlatPiece& piece, const Symmetry& symmetry, CurveKind kind) {
+  Chart chart;
+  chart.kind = kind == CurveKind::kPeano2 ? ChartKind::kPeanoSquare : ChartKind::kHilbertSquare;
+  chart.square_count = piece.square_count;
+  chart.faces.reserve(piece.faces.size());
   for (const FlatFace& flat : piece.faces) {
-    SheetFace face;
+    ChartFace face;
     face.triangle = flat.triangle;
     for (std::size_t c = 0; c < 3; ++c) face.places[c] = symmetry(flat.places[c], piece.square_count);
-    if (flat.barycentric != sheet.corners_b(face)) {
-      face.part = static_cast<std::uint32_t>(sheet.parts.size());
-      sheet.parts.push_back(flat.barycentric);
+    if (flat.barycentric != chart.corners_b(face)) {
+      face.part = static_cast<std::uint32_t>(chart.parts.size());
+      chart.parts.push_back(flat.barycentric);
     }
-    sheet.faces.push_back(face);
+    chart.faces.push_back(face);
   }
-  return sheet;
+  return chart;
 }
 
-Sheet sheet_in_space(const std::vector<std::uint32_t>& triangles) {
-  Sheet sheet;
-  sheet.kind = SheetKind::kHilbertCube;
+Chart chart_in_space(const std::vector<std::uint32_t>& triangles) {
+  Chart chart;
+  chart.kind = ChartKind::kHilbertCube;
   for (const auto t : triangles) {
-    sheet.faces.emplace_back();
-    sheet.faces.back().triangle = t;
+    chart.faces.emplace_back();
+    chart.faces.back().triangle = t;
   }
-  return sheet;
+  return chart;
 }
 
 std::vector<std::uint32_t> triangles_of(const FlatPiece& piece) {
@@ -99,10 +99,10 @@ struct PieceIndex {
 
 }  // namespace
 
-LaidOut lay_out(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<Component>& components,
-                CurveKind kind, const Progress& progress) {
-  std::vector<FlatComponent> flats = flatten_all(mesh, neighbours, components, progress);
-  LaidOut result;
+Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<Component>& components,
+                    CurveKind kind, const Progress& progress) {
+  std::vector<FlatComponent> flats = flatten_all(mesh, neighbors, components, progress);
+  Charts result;
   std::vector<PieceIndex> pieces;
   std::vector<ChainPiece> chain_pieces_of;
   for (std::uint32_t c = 0; c < flats.size(); ++c) {
@@ -113,26 +113,26 @@ LaidOut lay_out(const TexturedMesh& mesh, const Neighbours& neighbours, const st
     }
   }
   const std::vector<ChainLink> chain = chain_pieces(chain_pieces_of);
-  result.sheets.resize(chain.size());
+  result.charts.resize(chain.size());
   std::vector<char> is_too_sheared(chain.size(), 0);
   tbb::parallel_for(std::size_t{0}, chain.size(), [&](std::size_t i) {
     const PieceIndex index = pieces[chain[i].piece];
     FlatPiece& piece = flats[index.component].pieces[index.piece];
-    Sheet& sheet = result.sheets[i];
+    Chart& chart = result.charts[i];
     if (piece.is_mapped()) {
-      sheet = sheet_on_square(piece, chain[i].symmetry, kind);
-      is_too_sheared[i] = !build_base_tree(sheet, mesh);
+      chart = chart_on_square(piece, chain[i].symmetry, kind);
+      is_too_sheared[i] = !build_base_tree(chart, mesh);
     }
     if (!piece.is_mapped() || is_too_sheared[i]) {
-      sheet = sheet_in_space(triangles_of(piece));
-      build_base_tree(sheet, mesh);
+      chart = chart_in_space(triangles_of(piece));
+      build_base_tree(chart, mesh);
     }
-    sheet.component = index.component;
+    chart.component = index.component;
     piece = {};
   });
   for (std::size_t i = 0; i < chain.size(); ++i)
     if (is_too_sheared[i]) {
-      ComponentReport& report = result.reports[result.sheets[i].component];
+      ComponentReport& report = result.reports[result.charts[i].component];
       report.is_mapped = false;
       report.order_reason = "its map onto the square is too sheared to be walked";
     }

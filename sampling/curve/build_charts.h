@@ -5,16 +5,16 @@
 #include "sampling/curve/stream_dots.h"
 #include "sampling/disk/components.h"
 
-/// From components to sheets: each is flattened, the pieces are chained, and their base trees are built.
+/// From components to charts: each is flattened, the pieces are chained, and their base trees are built.
 namespace hilbrush {
 
-struct LaidOut {
-  std::vector<Sheet> sheets;  ///< in the order in which they are walked; several of one component if it was divided
+struct Charts {
+  std::vector<Chart> charts;  ///< in the order in which they are walked; several of one component if it was divided
   std::vector<ComponentReport> reports;  ///< as `components`
 };
 
 /// In parallel over components; the same result for any number of threads. `progress` is called from this thread.
-LaidOut lay_out(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<Component>& components,
-                CurveKind kind, const Progress& progress);
+Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<Component>& components,
+                    CurveKind kind, const Progress& progress);
 
 }  // namespace hilbrush

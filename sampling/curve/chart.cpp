@@ -11,41 +11,41 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr std::size_t kMostFaces = 8;
+constexpr std::size_t kMaxFaces = 8;
 /// A quad with no more than a small share of a mean triangle's area may hold as many: around a vertex with many
 /// triangles, and along needles, division would not end by itself.
-constexpr std::size_t kMostFacesIfSmall = 64;
+constexpr std::size_t kMaxFacesIfSmall = 64;
 constexpr double kSmallShare = .25;
 /// No quad holds more than one part in so many of the mesh's area, however few its triangles: threads and strata find
 /// their way from base quads, and the walk to a place below one stays short.
-constexpr double kLeastQuads = 4000;
+constexpr double kMinQuads = 4000;
 /// Division also ends where it would multiply the listed triangles by more than this power of a quad's side: 1.9 with
 /// four children.
 constexpr double kTooManyExponent = .926;
 constexpr int kDeepest = 24;
 constexpr double kCubeMargin = 1.05, kCubeMiddle = .4871828;
 /// A sound map lists each face in a few quads.
-constexpr std::size_t kMostListed = 1'000'000, kMostListedPerFace = 60;
+constexpr std::size_t kMaxListed = 1'000'000, kMaxListedPerFace = 60;
 /// Rounding may not lose a triangle that touches a quad.
 constexpr double kTouch = 1e-14;
 
-/// Builds the base tree of one sheet for one kind of curve.
+/// Builds the base tree of one chart for one kind of curve.
 template <class Curve>
 class TreeBuilder {
  public:
   static constexpr int kDimensions = kDimensionsOf<Curve>;
   using Place = Eigen::Matrix<double, kDimensions, 1>;
 
-  TreeBuilder(Sheet& sheet, const TexturedMesh& mesh)
-      : sheet_(sheet), mesh_(mesh), too_many_(std::pow(Curve::kSide, kTooManyExponent)) {
+  TreeBuilder(Chart& chart, const TexturedMesh& mesh)
+      : chart_(chart), mesh_(mesh), too_many_(std::pow(Curve::kSide, kTooManyExponent)) {
     double area = 0;
-    faces_.reserve(sheet.faces.size());
-    for (const SheetFace& face : sheet.faces) {
+    faces_.reserve(chart.faces.size());
+    for (const ChartFace& face : chart.faces) {
       faces_.push_back(measure(face));
       area += faces_.back().area;
     }
     small_area_ = kSmallShare * area / static_cast<double>(std::max<std::size_t>(1, faces_.size()));
-    large_area_ = mesh.area_m2() / kLeastQuads;
+    large_area_ = mesh.area_m2() / kMinQuads;
     for (auto& level : levels_) level.resize(Curve::kChildCount);
   }
 
@@ -61,11 +61,11 @@ class TreeBuilder {
     } else {
       Curve curve{};
       std::vector<std::uint32_t> here;
-      for (int i = 0; i < sheet_.square_count; ++i, curve = curve.next_square()) {
+      for (int i = 0; i < chart_.square_count; ++i, curve = curve.next_square()) {
         here.clear();
         const Place low(i, 0);
         for (const auto f : all)
-          if (sheet_.square_count == 1 || overlaps(faces_[f], f, low, 1)) here.push_back(f);
+          if (chart_.square_count == 1 || overlaps(faces_[f], f, low, 1)) here.push_back(f);
         divide(low, 1, curve, 0, here);
       }
     }
@@ -78,8 +78,8 @@ class TreeBuilder {
     double density = 0;  ///< m^2 for a unit of the square
   };
 
-  Face measure(const SheetFace& face) const {
-    const auto piece = whole_piece<kDimensions>(sheet_, mesh_, face);
+  Face measure(const ChartFace& face) const {
+    const auto piece = whole_piece<kDimensions>(chart_, mesh_, face);
     Face result;
     result.low = result.high = piece.corners[0].place;
     for (std::size_t c = 1; c < 3; ++c) {
@@ -97,12 +97,12 @@ class TreeBuilder {
     for (int k = 0; k < kDimensions; ++k)
       if (face.high[k] < low[k] || face.low[k] > low[k] + size) return false;
     if constexpr (kDimensions == 3) {
-      auto piece = whole_piece<3>(sheet_, mesh_, sheet_.faces[f]);
+      auto piece = whole_piece<3>(chart_, mesh_, chart_.faces[f]);
       clip_to_box<3>(piece, low, size);
       return piece.corner_count >= 3;
     } else {
       // Beyond one of the three sides?
-      const auto& p = sheet_.faces[f].places;
+      const auto& p = chart_.faces[f].places;
       const double turn = cross(p[1] - p[0], p[2] - p[0]) < 0 ? -1 : 1;
       const Vector2d middle = low + Vector2d::Constant(size / 2);
       for (std::size_t k = 0; k < 3; ++k) {
@@ -126,19 +126,19 @@ class TreeBuilder {
 
   bool is_leaf(const std::vector<std::uint32_t>& list, double size, int depth) const {
     if (depth == kDeepest) return true;
-    if (list.size() > kMostFacesIfSmall) return false;
-    return area_bound(list, size) <= (list.size() <= kMostFaces ? large_area_ : std::min(small_area_, large_area_));
+    if (list.size() > kMaxFacesIfSmall) return false;
+    return area_bound(list, size) <= (list.size() <= kMaxFaces ? large_area_ : std::min(small_area_, large_area_));
   }
 
   bool is_out_of_bounds() const {
-    return sheet_.face_lists.size() > kMostListed + kMostListedPerFace * sheet_.faces.size();
+    return chart_.face_lists.size() > kMaxListed + kMaxListedPerFace * chart_.faces.size();
   }
 
   void add_leaf(const Place& low, double size, Curve curve, int depth, const std::vector<std::uint32_t>& list) {
     BaseQuad quad;
     quad.low.template head<kDimensions>() = low;
     quad.size = size;
-    quad.first_face = static_cast<std::uint32_t>(sheet_.face_lists.size());
+    quad.first_face = static_cast<std::uint32_t>(chart_.face_lists.size());
     quad.face_count = static_cast<std::uint32_t>(list.size());
     quad.depth = static_cast<std::uint8_t>(depth);
     if constexpr (kDimensions == 3) {
@@ -147,8 +147,8 @@ class TreeBuilder {
     } else {
       quad.permutation = curve.permutation;
     }
-    sheet_.face_lists.insert(sheet_.face_lists.end(), list.begin(), list.end());
-    sheet_.base_quads.push_back(quad);
+    chart_.face_lists.insert(chart_.face_lists.end(), list.begin(), list.end());
+    chart_.base_quads.push_back(quad);
   }
 
   static Place child_low(const Place& low, double size, unsigned place) {
@@ -172,7 +172,7 @@ class TreeBuilder {
         if (overlaps(faces_[f], f, at, child_size)) children[place].push_back(f);
       count += children[place].size();
     }
-    if (list.size() > kMostFaces && list.size() <= kMostFacesIfSmall &&
+    if (list.size() > kMaxFaces && list.size() <= kMaxFacesIfSmall &&
         static_cast<double>(count) > too_many_ * static_cast<double>(list.size()) &&
         area_bound(list, size) <= large_area_)
       return add_leaf(low, size, curve, depth, list);
@@ -182,7 +182,7 @@ class TreeBuilder {
     }
   }
 
-  Sheet& sheet_;
+  Chart& chart_;
   const TexturedMesh& mesh_;
   std::vector<Face> faces_;
   double small_area_ = 0, large_area_ = 0;
@@ -193,8 +193,8 @@ class TreeBuilder {
 }  // namespace
 
 template <int kDimensions>
-Piece<kDimensions> whole_piece(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face) {
-  const auto b = sheet.corners_b(face);
+Piece<kDimensions> whole_piece(const Chart& chart, const TexturedMesh& mesh, const ChartFace& face) {
+  const auto b = chart.corners_b(face);
   Piece<kDimensions> piece;
   for (std::size_t c = 0; c < 3; ++c) {
     if constexpr (kDimensions == 3)
@@ -204,8 +204,8 @@ Piece<kDimensions> whole_piece(const Sheet& sheet, const TexturedMesh& mesh, con
   }
   return piece;
 }
-template Piece<2> whole_piece<2>(const Sheet&, const TexturedMesh&, const SheetFace&);
-template Piece<3> whole_piece<3>(const Sheet&, const TexturedMesh&, const SheetFace&);
+template Piece<2> whole_piece<2>(const Chart&, const TexturedMesh&, const ChartFace&);
+template Piece<3> whole_piece<3>(const Chart&, const TexturedMesh&, const ChartFace&);
 
 template <int kDimensions>
 void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size) {
@@ -224,11 +224,10 @@ void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensi
 template void clip_to_box<2>(Piece<2>&, const Eigen::Vector2d&, double);
 template void clip_to_box<3>(Piece<3>&, const Eigen::Vector3d&, double);
 
-bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh) {
-  return with_curve(sheet.kind, [&]<class Curve>(Curve) {
-    TreeBuilder<Curve>(sheet, mesh).build();
-    return kDimensionsOf<Curve> == 3 ||
-           sheet.face_lists.size() <= kMostListed + kMostListedPerFace * sheet.faces.size();
+bool build_base_tree(Chart& chart, const TexturedMesh& mesh) {
+  return with_curve(chart.kind, [&]<class Curve>(Curve) {
+    TreeBuilder<Curve>(chart, mesh).build();
+    return kDimensionsOf<Curve> == 3 || chart.face_lists.size() <= kMaxListed + kMaxListedPerFace * chart.faces.size();
   });
 }
 

@@ -9,13 +9,13 @@
 #include "sampling/curve/piece.h"
 #include "sampling/model/textured_mesh.h"
 
-/// A sheet is a stretch of the surface that one curve walks: a component on the unit square, or a component in space.
+/// A chart is a stretch of the surface that one curve walks: a component on the unit square, or a component in space.
 /// Its base tree is divided until a quad (in space: a cube) holds few triangles and little area; everything finer is
 /// made anew on each walk and not kept.
 namespace hilbrush {
 
-/// What the curve of a sheet fills: the square, or a row of squares, or a cube.
-enum class SheetKind : std::uint8_t { kHilbertSquare, kPeanoSquare, kHilbertCube };
+/// What the curve of a chart fills: the square, or a row of squares, or a cube.
+enum class ChartKind : std::uint8_t { kHilbertSquare, kPeanoSquare, kHilbertCube };
 
 template <class Curve>
 inline constexpr int kDimensionsOf = Curve::kChildCount == 8 ? 3 : 2;
@@ -24,7 +24,7 @@ inline constexpr int kDimensionsOf = Curve::kChildCount == 8 ? 3 : 2;
 struct BaseQuad {
   Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< z = 0 on the square
   double size = 1;
-  std::uint32_t first_face = 0, face_count = 0;      ///< in Sheet::face_lists
+  std::uint32_t first_face = 0, face_count = 0;      ///< in Chart::face_lists
   std::uint8_t permutation = 0, cube_direction = 0;  ///< how the curve runs in it: curve_of()
   std::uint8_t depth = 0;
 };
@@ -38,42 +38,42 @@ Curve curve_of(const BaseQuad& quad) {
 }
 
 /// A mesh triangle on the square, or the part of one that the map's splits have left.
-struct SheetFace {
+struct ChartFace {
   static constexpr std::uint32_t kWhole = ~std::uint32_t{0};
   std::uint32_t triangle = 0;
-  std::uint32_t part = kWhole;  ///< else an index into Sheet::parts
+  std::uint32_t part = kWhole;  ///< else an index into Chart::parts
   /// On the square; not used in space.
   std::array<Eigen::Vector2d, 3> places{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
 };
 
-struct Sheet {
+struct Chart {
   std::uint32_t component = 0;
-  SheetKind kind = SheetKind::kHilbertSquare;
+  ChartKind kind = ChartKind::kHilbertSquare;
   int square_count = 1;  ///< squares in a row, each walked so that the next one begins where it ends
-  std::vector<SheetFace> faces;
+  std::vector<ChartFace> faces;
   std::vector<std::array<Eigen::Vector2d, 3>> parts;  ///< corners by second and third barycentric coordinate
   std::vector<std::uint32_t> face_lists;
   std::vector<BaseQuad> base_quads;  ///< in order of the curve; empty ones are left out
 
-  const SheetFace& face_of(const BaseQuad& quad, std::uint32_t i) const {
+  const ChartFace& face_of(const BaseQuad& quad, std::uint32_t i) const {
     return faces[face_lists[quad.first_face + i]];
   }
   /// A face's corners by second and third barycentric coordinate.
-  std::array<Eigen::Vector2d, 3> corners_b(const SheetFace& face) const {
-    if (face.part != SheetFace::kWhole) return parts[face.part];
+  std::array<Eigen::Vector2d, 3> corners_b(const ChartFace& face) const {
+    if (face.part != ChartFace::kWhole) return parts[face.part];
     return {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
   }
 };
 
-/// Calls `visit` with the sheet's kind of curve.
+/// Calls `visit` with the chart's kind of curve.
 template <class Visit>
-decltype(auto) with_curve(SheetKind kind, Visit visit) {
+decltype(auto) with_curve(ChartKind kind, Visit visit) {
   switch (kind) {
-    case SheetKind::kPeanoSquare:
+    case ChartKind::kPeanoSquare:
       return visit(PeanoQuad{});
-    case SheetKind::kHilbertCube:
+    case ChartKind::kHilbertCube:
       return visit(HilbertCube{});
-    case SheetKind::kHilbertSquare:
+    case ChartKind::kHilbertSquare:
       break;
   }
   return visit(HilbertQuad{});
@@ -81,14 +81,14 @@ decltype(auto) with_curve(SheetKind kind, Visit visit) {
 
 /// A face as a piece, with its places on the square (2) or in space (3).
 template <int kDimensions>
-Piece<kDimensions> whole_piece(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face);
+Piece<kDimensions> whole_piece(const Chart& chart, const TexturedMesh& mesh, const ChartFace& face);
 
 /// Cuts a piece to a box; what is left may be empty.
 template <int kDimensions>
 void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size);
 
-/// Fills in the base tree of a sheet whose faces are there. Cost O(faces log faces). On the square it gives up and
+/// Fills in the base tree of a chart whose faces are there. Cost O(faces log faces). On the square it gives up and
 /// returns false if the map is so sheared that the quads would hold each triangle many times.
-bool build_base_tree(Sheet& sheet, const TexturedMesh& mesh);
+bool build_base_tree(Chart& chart, const TexturedMesh& mesh);
 
 }  // namespace hilbrush

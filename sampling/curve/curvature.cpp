@@ -66,8 +66,7 @@ double bend(const TexturedMesh& mesh, std::uint32_t t, int side, std::uint32_t a
   return length * std::atan2(n.cross(m).dot(edge) / length, n.dot(m));
 }
 
-std::vector<VertexIntegrals> integrate_around(const TexturedMesh& mesh, const Neighbours& neighbours,
-                                              const Fans& fans) {
+std::vector<VertexIntegrals> integrate_around(const TexturedMesh& mesh, const Neighbors& neighbors, const Fans& fans) {
   std::vector<VertexIntegrals> vertices(fans.count);
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
     const std::array<double, 3> areas = mixed_areas(mesh, t);
@@ -78,7 +77,7 @@ std::vector<VertexIntegrals> integrate_around(const TexturedMesh& mesh, const Ne
     }
     for (std::size_t side = 0; side < 3; ++side) {
       VertexIntegrals &from = vertices[fans.of_corners[t][side]], &to = vertices[fans.of_corners[t][(side + 1) % 3]];
-      const TriangleSide across = neighbours[t][side];
+      const TriangleSide across = neighbors[t][side];
       if (across == kNoSide) {
         from.is_boundary = to.is_boundary = true;
         continue;
@@ -108,9 +107,9 @@ struct RingSums {
 }  // namespace
 
 Curvature measure_curvature(const TexturedMesh& mesh) {
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
-  const Fans fans = find_fans(neighbours);
-  const std::vector<VertexIntegrals> vertices = integrate_around(mesh, neighbours, fans);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
+  const Fans fans = find_fans(neighbors);
+  const std::vector<VertexIntegrals> vertices = integrate_around(mesh, neighbors, fans);
   std::vector<RingSums> rings(vertices.size());
   for (std::size_t v = 0; v < vertices.size(); ++v) rings[v].add(vertices[v]);
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
@@ -118,7 +117,7 @@ Curvature measure_curvature(const TexturedMesh& mesh) {
       const std::uint32_t from = fans.of_corners[t][side], to = fans.of_corners[t][(side + 1) % 3];
       rings[from].add(vertices[to]);
       // An edge with a triangle on its other side is met from there too.
-      if (neighbours[t][side] == kNoSide) rings[to].add(vertices[from]);
+      if (neighbors[t][side] == kNoSide) rings[to].add(vertices[from]);
     }
   Curvature curvature;
   curvature.mean.resize(mesh.triangle_count());

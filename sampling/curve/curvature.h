@@ -19,7 +19,7 @@ struct Curvature {
 /// a third of an obtuse triangle for its acute corners where Meyer et al. and this take a quarter, which adds up).
 /// Mean: lengths of edges times their dihedral angles (Cohen-Steiner and Morvan 2003) over the same area: it needs no
 /// cotangents, so slivers do it no harm, and it is exact on prisms and cylinders. Both are averaged, by area, over a
-/// vertex and its neighbours. A boundary has no angle defect of its own: its vertices get their neighbours' Gaussian
+/// vertex and its neighbors. A boundary has no angle defect of its own: its vertices get their neighbors' Gaussian
 /// curvature. Differs from the thesis, which fits a quadric (unsteady on few or thin triangles). Cost O(triangles).
 Curvature measure_curvature(const TexturedMesh& mesh);
 

@@ -17,8 +17,8 @@ namespace {
 constexpr std::size_t kGrain = 256;
 
 /// m^2 for a unit of the square; infinite where the map has no area.
-double density_on_square(const Sheet& sheet, const TriangleTone& tone, const SheetFace& face) {
-  const auto b = sheet.corners_b(face);
+double density_on_square(const Chart& chart, const TriangleTone& tone, const ChartFace& face) {
+  const auto b = chart.corners_b(face);
   const auto& p = face.places;
   return tone.space() * std::abs(cross(b[1] - b[0], b[2] - b[0]) / cross(p[1] - p[0], p[2] - p[0]));
 }
@@ -26,25 +26,25 @@ double density_on_square(const Sheet& sheet, const TriangleTone& tone, const She
 template <class Curve>
 void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass* pieces, double& painted_area_m2) {
   constexpr int kDimensions = kDimensionsOf<Curve>;
-  const Sheet& sheet = mass.sheet_of(result);
+  const Chart& chart = mass.chart_of(result);
   const BaseQuad& quad = mass.base_quad(result);
   double total = 0, squares = 0;
   for (std::uint32_t i = 0; i < quad.face_count; ++i) {
-    const SheetFace& face = sheet.face_of(quad, i);
+    const ChartFace& face = chart.face_of(quad, i);
     pieces[i].triangle = face.triangle;
     const TriangleTone tone = mass.tone.on(face.triangle);
     if (tone.is_blank()) continue;
-    auto piece = whole_piece<kDimensions>(sheet, mass.curve.mesh, face);
+    auto piece = whole_piece<kDimensions>(chart, mass.curve.mesh, face);
     clip_to_box<kDimensions>(piece, quad.low.template head<kDimensions>(), quad.size);
     const ToneIntegral integral = integrate(tone, piece);
     if (!(integral.mass > 0)) continue;
-    const Eigen::Vector2d centre = integral.first / integral.mass;
-    pieces[i] = {integral.mass, static_cast<float>(integral.square), face.triangle, centre.cast<float>()};
+    const Eigen::Vector2d center = integral.first / integral.mass;
+    pieces[i] = {integral.mass, static_cast<float>(integral.square), face.triangle, center.cast<float>()};
     total += integral.mass;
     painted_area_m2 += integral.area_m2;
     result.moment_O +=
-        integral.mass * position(mass.curve.mesh, {face.triangle, {1 - centre.sum(), centre.x(), centre.y()}});
-    if constexpr (kDimensions == 2) squares += integral.square * density_on_square(sheet, tone, face);
+        integral.mass * position(mass.curve.mesh, {face.triangle, {1 - center.sum(), center.x(), center.y()}});
+    if constexpr (kDimensions == 2) squares += integral.square * density_on_square(chart, tone, face);
   }
   if constexpr (kDimensions == 2)
     if (std::isfinite(squares))
@@ -63,11 +63,11 @@ CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
   CHECK(&curve.mesh() == &tone.mesh());
   Implementation& mass = *implementation_;
   std::size_t piece_count = 0;
-  for (std::uint32_t s = 0; s < mass.curve.sheets.size(); ++s)
-    for (std::uint32_t q = 0; q < mass.curve.sheets[s].base_quads.size(); ++q) {
-      const BaseQuad& base = mass.curve.sheets[s].base_quads[q];
+  for (std::uint32_t s = 0; s < mass.curve.charts.size(); ++s)
+    for (std::uint32_t q = 0; q < mass.curve.charts[s].base_quads.size(); ++q) {
+      const BaseQuad& base = mass.curve.charts[s].base_quads[q];
       QuadMass& quad = mass.quads.emplace_back();
-      quad.sheet = s;
+      quad.chart = s;
       quad.quad = q;
       quad.first_piece = static_cast<std::uint32_t>(piece_count);
       quad.piece_count = base.face_count;
@@ -81,17 +81,17 @@ CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       QuadMass& quad = mass.quads[i];
       PieceMass* pieces = mass.pieces.data() + quad.first_piece;
-      with_curve(mass.sheet_of(quad).kind,
+      with_curve(mass.chart_of(quad).kind,
                  [&]<class Curve>(Curve) { measure<Curve>(mass, quad, pieces, painted_area_m2[i]); });
     }
   });
-  mass.painted_area_m2.assign(mass.curve.sheets.size(), 0);
+  mass.painted_area_m2.assign(mass.curve.charts.size(), 0);
   mass.mass_before.assign(mass.quads.size() + 1, 0);
   for (std::size_t i = 0; i < mass.quads.size(); ++i) {
     const QuadMass& quad = mass.quads[i];
     double sum = 0;
     for (const PieceMass& piece : mass.pieces_of(quad)) sum += piece.mass;
-    mass.painted_area_m2[quad.sheet] += painted_area_m2[i];
+    mass.painted_area_m2[quad.chart] += painted_area_m2[i];
     mass.mass_before[i + 1] = mass.mass_before[i] + sum;
   }
 }

@@ -51,12 +51,12 @@ template <class Curve>
 inline constexpr CurveTable<Curve> kCurveTable{};
 
 /// Steps of the table that reach any depth that doubles can tell apart.
-inline constexpr int kMostCurveSteps = 8;
+inline constexpr int kMaxCurveSteps = 8;
 
 /// Integral of the curve's place over its first `share`, in the unit square. Within each of the smallest squares (side
 /// 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the place is taken as its middle.
 template <class Curve>
-inline Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMostCurveSteps) {
+inline Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMaxCurveSteps) {
   using Table = CurveTable<Curve>;
   // In units of the child that the walk is in: its side, and its share of the curve.
   double moment_x = 0, moment_y = 0, low_x = 0, low_y = 0, size = 1, weight = 1;
@@ -84,7 +84,7 @@ Eigen::Vector2d curve_place(Curve curve, double share) {
   using Table = CurveTable<Curve>;
   Eigen::Vector2d low(0, 0);
   double size = 1;
-  for (int step = 0; step < kMostCurveSteps; ++step) {
+  for (int step = 0; step < kMaxCurveSteps; ++step) {
     const double f = Table::kCount * std::clamp(share, 0., 1.);
     const unsigned i = std::min(static_cast<unsigned>(f), Table::kCount - 1);
     const auto& entry = kCurveTable<Curve>.entries[curve.permutation][i];

@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 /// How far outside of a face rounding may put a place that is in it, as a share of the face.
 constexpr double kOnSide = 1e-12;
 /// Where a sequence hits blank surface within a patch, so many other places in the patch are tried.
-constexpr int kMostTries = 8;
+constexpr int kMaxTries = 8;
 
 /// A place on the square, on the faces of a base quad.
 struct Lifted {
@@ -26,7 +26,7 @@ struct Lifted {
   bool is_inside = false;
 };
 
-/// `likely` is the frame to begin with, and then the one that was found: neighbours on the curve lie on few faces.
+/// `likely` is the frame to begin with, and then the one that was found: neighbors on the curve lie on few faces.
 template <class Walk>
 inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likely) {
   const std::uint32_t count = walk.frame_count();
@@ -58,7 +58,7 @@ inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likel
 
 /// Steps of the curve's table that are fine enough for a patch with so many dots.
 int curve_steps(double dots) {
-  return dots < .5 ? 1 : dots < 30 ? 2 : dots < 2000 ? 3 : dots < 1e5 ? 4 : kMostCurveSteps;
+  return dots < .5 ? 1 : dots < 30 ? 2 : dots < 2000 ? 3 : dots < 1e5 ? 4 : kMaxCurveSteps;
 }
 
 /// Mean places of stretches of a curve. Where one ends, the next one most often begins.
@@ -96,8 +96,8 @@ class DotWriter {
 
  protected:
   /// `asked`: the tone there, if it is known.
-  void put_at(const SurfacePoint& point, std::uint32_t sheet, std::optional<double> asked = {}) {
-    const std::uint32_t component = plan_.mass.curve.sheets[sheet].component;
+  void put_at(const SurfacePoint& point, std::uint32_t chart, std::optional<double> asked = {}) {
+    const std::uint32_t component = plan_.mass.curve.charts[chart].component;
     dots_.push_back(triangles_[point.triangle].dot_at(point.barycentric, component, asked));
   }
 
@@ -109,8 +109,8 @@ class DotWriter {
   std::vector<Dot>& dots_;
 };
 
-/// Puts one dot at the centre of each stratum.
-class CentreWriter : public DotWriter {
+/// Puts one dot at the center of each stratum.
+class CenterWriter : public DotWriter {
  public:
   using DotWriter::DotWriter;
 
@@ -118,11 +118,11 @@ class CentreWriter : public DotWriter {
   void add_quads(std::size_t first, std::size_t last) {
     const CurveMass::Implementation& mass = plan_.mass;
     for (std::size_t begin = first; begin < last;) {
-      const std::uint32_t sheet = mass.quads[begin].sheet;
-      StratumPart& part = stratum_.on(sheet);
+      const std::uint32_t chart = mass.quads[begin].chart;
+      StratumPart& part = stratum_.on(chart);
       double sum = 0, heaviest = 0;
       std::size_t heaviest_quad = begin, q = begin;
-      for (; q < last && mass.quads[q].sheet == sheet; ++q) {
+      for (; q < last && mass.quads[q].chart == chart; ++q) {
         const double quad_mass = mass.mass_of(q);
         sum += quad_mass;
         part.moment_O += mass.quads[q].moment_O;
@@ -147,7 +147,7 @@ class CentreWriter : public DotWriter {
   void add_quad(std::size_t quad, double from, double to) {
     const double mass = (to - from) * plan_.mass.mass_of(quad);
     last_quad_ = quad;
-    StratumPart& part = stratum_.on(plan_.mass.quads[quad].sheet);
+    StratumPart& part = stratum_.on(plan_.mass.quads[quad].chart);
     part.mass += mass;
     part.moment_O += (to - from) * plan_.mass.quads[quad].moment_O;
     part.triangle = kNoTriangle;
@@ -181,8 +181,8 @@ class CentreWriter : public DotWriter {
     // Rounding may leave nothing to a stratum at the very end of the curve.
     if (stratum_.is_empty()) add_quads(last_quad_, last_quad_ + 1);
     const StratumPart& part = stratum_.heaviest();
-    const PaintedPoint centre = centre_on_surface(plan_.mass, triangles_, part);
-    put_at(centre.point, part.sheet, centre.asked);
+    const PaintedPoint center = center_on_surface(plan_.mass, triangles_, part);
+    put_at(center.point, part.chart, center.asked);
     stratum_.clear();
   }
 
@@ -201,7 +201,7 @@ class CentreWriter : public DotWriter {
       const SurfacePoint point = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
       const double asked = triangles_[point.triangle].asked(point.barycentric);
       if (is_surely_painted(asked)) {
-        put_at(point, walk.sheet(), asked);
+        put_at(point, walk.chart(), asked);
       } else {
         add_even(walk, node, ends[i - 1], ends[i]);
         close(index);
@@ -216,8 +216,8 @@ class CentreWriter : public DotWriter {
     return node.low + node.size * stretches_.mean_place(node.curve, from, to, steps);
   }
 
-  StratumPart& begin_part(std::uint32_t sheet) {
-    StratumPart& part = stratum_.on(sheet);
+  StratumPart& begin_part(std::uint32_t chart) {
+    StratumPart& part = stratum_.on(chart);
     is_new_ = !(part.mass > 0);
     return part;
   }
@@ -236,7 +236,7 @@ class CentreWriter : public DotWriter {
     const double mass = (to - from) * node.mass;
     const Lifted lifted = lift(walk, mean_place(node, from, to), likely_frame_);
     const FaceFrame& frame = walk.frame(lifted.frame);
-    StratumPart& part = begin_part(walk.sheet());
+    StratumPart& part = begin_part(walk.chart());
     part.moment_O += mass * frame.at(lifted.b);
     add_in_triangle(part, frame.triangle, mass * lifted.b);
     part.mass += mass;
@@ -250,7 +250,7 @@ class CentreWriter : public DotWriter {
   template <class Curve>
   void add_pieces(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
     const double share = to - from;
-    StratumPart& part = begin_part(walk.sheet());
+    StratumPart& part = begin_part(walk.chart());
     const auto& heaviest = walk.heaviest(node);
     for (const auto index : node.pieces) {
       const auto& held = walk.held(index);
@@ -305,10 +305,10 @@ class PlaceWriter : public DotWriter {
   template <class Curve>
   void put(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind, double share,
            std::uint64_t) {
-    put_at(point_in(walk, node, share), walk.sheet());
+    put_at(point_in(walk, node, share), walk.chart());
   }
   /// At the end of the curve, beyond what rounding has left of its last quad.
-  void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads[quad].sheet); }
+  void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads[quad].chart); }
 
  private:
   /// Within a patch the mass is taken as even on what is painted of it: where the curve is on blank surface, or beside
@@ -317,7 +317,7 @@ class PlaceWriter : public DotWriter {
   SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double share) {
     if constexpr (QuadWalk<Curve>::kDimensions == 2) {
       const double dots = std::max(1., node.mass / plan_.rule.dot_mass);
-      for (int i = 0; i < kMostTries; ++i) {
+      for (int i = 0; i < kMaxTries; ++i) {
         const double at = share + std::fmod(i * std::numbers::phi, 1.) / dots;
         const Vector2d place = node.low + node.size * curve_place(node.curve, at - std::floor(at));
         const Lifted lifted = lift(walk, place, likely_frame_);
@@ -328,8 +328,8 @@ class PlaceWriter : public DotWriter {
     if (node.pieces.empty()) return heaviest_point(plan_.mass, walk.quad());
     const auto& heaviest = walk.heaviest(node);
     const std::uint32_t triangle = walk.frame(heaviest.frame).triangle;
-    const SurfacePoint centre = surface_point(triangle, heaviest.integral.first / heaviest.integral.mass);
-    if (triangles_[triangle].asked(centre.barycentric) > 0) return centre;
+    const SurfacePoint center = surface_point(triangle, heaviest.integral.first / heaviest.integral.mass);
+    if (triangles_[triangle].asked(center.barycentric) > 0) return center;
     std::vector<Vector2d> polygon;
     for (const auto& corner : heaviest.piece.all()) polygon.push_back(corner.b);
     return point_with_tone(plan_.mass.tone, triangle, polygon);
@@ -356,7 +356,7 @@ void BlockMaker::make(std::uint64_t first, std::uint64_t last, DotBlock& block) 
     PlaceWriter writer(plan_, triangles_, block.dots);
     find_places(plan_, walks_, first, last, writer, block.patches_at_depth);
   } else {
-    CentreWriter writer(plan_, triangles_, block.dots);
+    CenterWriter writer(plan_, triangles_, block.dots);
     cut_strata(plan_, walks_, first, last, writer, block.patches_at_depth);
   }
   CHECK_EQ(block.dots.size(), last - first);

@@ -12,7 +12,7 @@ namespace hilbrush {
 
 /// A face, with the affine maps of its triangle.
 struct FaceFrame {
-  FaceFrame(const Sheet& sheet, const TexturedMesh& mesh, const SheetFace& face);
+  FaceFrame(const Chart& chart, const TexturedMesh& mesh, const ChartFace& face);
 
   std::uint32_t triangle;
   Eigen::Vector3d origin_O, e1_O, e2_O;  ///< corner 0 of the triangle; from there to corners 1 and 2
@@ -35,7 +35,7 @@ class FaceFrames {
   explicit FaceFrames(const ToneField& tone) : tone_(tone) {}
 
   /// The frames of a quad's faces, in the quad's order; valid until the next call.
-  void fetch(const Sheet& sheet, const BaseQuad& quad, std::vector<FaceFrame*>& frames);
+  void fetch(const Chart& chart, const BaseQuad& quad, std::vector<FaceFrame*>& frames);
   /// The tone on a frame's triangle, which many frames are never asked for.
   const TriangleTone& tone_on(FaceFrame& frame) const {
     if (!frame.tone) frame.tone = tone_.on(frame.triangle);
@@ -43,17 +43,17 @@ class FaceFrames {
   }
 
  private:
-  static constexpr std::size_t kMostFrames = 1024, kSlots = 4096;
+  static constexpr std::size_t kMaxFrames = 1024, kSlots = 4096;
   static constexpr std::uint32_t kEmpty = ~std::uint32_t{0};
   struct Slot {
     std::uint32_t face = kEmpty, frame = 0;
   };
 
   void clear(std::size_t room);
-  FaceFrame& frame_of(const Sheet& sheet, std::uint32_t face);
+  FaceFrame& frame_of(const Chart& chart, std::uint32_t face);
 
   const ToneField& tone_;
-  const Sheet* sheet_ = nullptr;
+  const Chart* chart_ = nullptr;
   std::vector<FaceFrame> frames_;  ///< never grows beyond its reserve: frames stay where they are
   std::vector<Slot> slots_;        ///< a hash table, searched upwards
 };

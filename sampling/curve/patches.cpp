@@ -10,8 +10,8 @@ void add_base_pieces(const CurveMass::Implementation& mass, std::size_t quad_ind
   const BaseQuad& base = mass.base_quad(quad);
   for (std::uint32_t i = 0; i < base.face_count; ++i) {
     if (!(mass.pieces_of(quad)[i].mass > 0)) continue;
-    const SheetFace& face = mass.sheet_of(quad).face_of(base, i);
-    auto cut = whole_piece<kDimensions>(mass.sheet_of(quad), mass.curve.mesh, face);
+    const ChartFace& face = mass.chart_of(quad).face_of(base, i);
+    auto cut = whole_piece<kDimensions>(mass.chart_of(quad), mass.curve.mesh, face);
     clip_to_box<kDimensions>(cut, base.low.template head<kDimensions>(), base.size);
     PatchPiece piece{face.triangle, {}, integrate(mass.tone.on(face.triangle), cut)};
     for (const auto& corner : cut.all()) piece.corners_b.push_back(corner.b);
@@ -21,11 +21,11 @@ void add_base_pieces(const CurveMass::Implementation& mass, std::size_t quad_ind
 
 Patch patch_of_quad(const CurveMass::Implementation& mass, std::size_t index) {
   Patch patch;
-  patch.sheet = mass.quads[index].sheet;
+  patch.chart = mass.quads[index].chart;
   patch.depth = mass.base_quad(mass.quads[index]).depth;
   patch.at = mass.mass_before[index];
   patch.mass = mass.mass_of(index);
-  with_curve(mass.sheet_of(mass.quads[index]).kind,
+  with_curve(mass.chart_of(mass.quads[index]).kind,
              [&]<class Curve>(Curve) { add_base_pieces<Curve>(mass, index, patch); });
   return patch;
 }
@@ -38,7 +38,7 @@ Patch patch_of(const CurveMass::Implementation& mass, const QuadWalk<Curve>& wal
     patch.kind = kind;
     return patch;
   }
-  Patch patch{walk.sheet(), node.depth, kind, node.at, node.mass, {}};
+  Patch patch{walk.chart(), node.depth, kind, node.at, node.mass, {}};
   for (const auto index : node.pieces) {
     const auto& held = walk.held(index);
     PatchPiece piece{walk.frame(held.frame).triangle, {}, held.integral};
@@ -91,7 +91,7 @@ void visit_patches(const CurveMass& curve_mass, const PatchRule& rule, const std
   const CurveMass::Implementation& mass = curve_mass.implementation();
   const AllPatches sink{mass, visit};
   for (std::size_t q = 0; q < mass.quads.size(); ++q)
-    with_curve(mass.sheet_of(mass.quads[q]).kind,
+    with_curve(mass.chart_of(mass.quads[q]).kind,
                [&]<class Curve>(Curve) { QuadWalk<Curve>(mass, rule).walk(q, sink); });
 }
 

@@ -16,7 +16,7 @@ struct PatchPiece {
 
 /// A leaf quad (in space: cube) clipped to the surface.
 struct Patch {
-  std::uint32_t sheet = 0;
+  std::uint32_t chart = 0;
   int depth = 0;
   PatchKind kind = PatchKind::kWhole;
   double at = 0, mass = 0;  ///< where on the curve it begins, and its mass

@@ -20,10 +20,10 @@ struct PieceCorner {
 template <int kDimensions>
 struct Piece {
   using Corner = PieceCorner<kDimensions>;
-  static constexpr std::size_t kMostCorners = 12;  ///< a triangle cut by the six sides of a cube has nine
+  static constexpr std::size_t kMaxCorners = 12;  ///< a triangle cut by the six sides of a cube has nine
 
   std::uint32_t corner_count = 0;
-  std::array<Corner, kMostCorners> corners;
+  std::array<Corner, kMaxCorners> corners;
 
   Piece() = default;
   ~Piece() = default;
@@ -39,7 +39,7 @@ struct Piece {
 
   void add(const Corner& corner) {
     // The cap is never met by a convex polygon; one that rounding has bent loses a corner on which nothing depends.
-    if (corner_count == kMostCorners) return;
+    if (corner_count == kMaxCorners) return;
     if (corner_count > 0 && corners[corner_count - 1].b == corner.b) return;
     corners[corner_count++] = corner;
   }

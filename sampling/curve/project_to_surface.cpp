@@ -12,8 +12,8 @@ namespace {
 using Eigen::Vector3d;
 
 /// Across needles a pitch is many triangles.
-constexpr int kLongestWalk = 64;
-constexpr int kMostHalvings = 40;
+constexpr int kMaxWalk = 64;
+constexpr int kMaxHalvings = 40;
 
 }  // namespace
 
@@ -23,15 +23,15 @@ NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t t, cons
   return nearest;
 }
 
-SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbours& neighbours, const SurfacePoint& start,
+SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbors& neighbors, const SurfacePoint& start,
                           const Vector3d& target) {
   NearestPoint here = nearest_in_triangle(mesh, start.triangle, target);
-  for (int step = 0; step < kLongestWalk; ++step) {
+  for (int step = 0; step < kMaxWalk; ++step) {
     NearestPoint best = here;
     for (int side = 0; side < 3; ++side) {
       // Only across a side on which the nearest point lies: the one opposite a corner without weight.
       if (here.point.barycentric[(side + 2) % 3] > 0) continue;
-      const TriangleSide across = neighbours[here.point.triangle][static_cast<std::size_t>(side)];
+      const TriangleSide across = neighbors[here.point.triangle][static_cast<std::size_t>(side)];
       if (across == kNoSide) continue;
       const NearestPoint there = nearest_in_triangle(mesh, across.triangle, target);
       if (there.distance2 < best.distance2 * (1 - 1e-12)) best = there;
@@ -46,21 +46,21 @@ SurfacePoint point_with_tone(const ToneField& field, std::uint32_t triangle, std
   const TriangleTone tone = field.on(triangle);
   Piece<2> piece;
   for (const Eigen::Vector2d& b : polygon) piece.add({b, b});
-  const auto centre_of = [&](const ToneIntegral& integral) {
+  const auto center_of = [&](const ToneIntegral& integral) {
     return Eigen::Vector2d(integral.mass > 0 ? integral.first / integral.mass : polygon[0]);
   };
-  Eigen::Vector2d centre = centre_of(integrate(tone, piece));
-  for (int halving = 0; halving < kMostHalvings && !(tone.asked(centre) > 0); ++halving) {
+  Eigen::Vector2d center = center_of(integrate(tone, piece));
+  for (int halving = 0; halving < kMaxHalvings && !(tone.asked(center) > 0); ++halving) {
     Piece<2> lower, upper;
-    cut_piece(piece, halving % 2, centre[halving % 2], lower, upper);
+    cut_piece(piece, halving % 2, center[halving % 2], lower, upper);
     const ToneIntegral of_lower = integrate(tone, lower), of_upper = integrate(tone, upper);
     const bool is_lower = of_lower.mass > of_upper.mass;
     const ToneIntegral& heavier = is_lower ? of_lower : of_upper;
     if (!(heavier.mass > 0)) break;
     piece = is_lower ? lower : upper;
-    centre = centre_of(heavier);
+    center = center_of(heavier);
   }
-  return {triangle, {1 - centre.sum(), centre.x(), centre.y()}};
+  return {triangle, {1 - center.sum(), center.x(), center.y()}};
 }
 
 }  // namespace hilbrush

@@ -7,7 +7,7 @@
 namespace hilbrush {
 
 /// The surface point nearest to `target_O` near `start`: a short walk from triangle to triangle.
-SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbours& neighbours, const SurfacePoint& start,
+SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbors& neighbors, const SurfacePoint& start,
                           const Eigen::Vector3d& target_O);
 
 /// The point of a triangle that is nearest to `target_O`, and how far that is, squared.

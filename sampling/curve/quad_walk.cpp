@@ -12,8 +12,8 @@ const typename QuadWalk<Curve>::Held& QuadWalk<Curve>::heaviest(const Node& node
 }
 
 template <class Curve>
-void QuadWalk<Curve>::hold_pieces(const QuadMass& quad, const BaseQuad& base, Node& node) {
-  const Sheet& sheet = mass_.sheet_of(quad);
+void QuadWalk<Curve>::push_pieces(const QuadMass& quad, const BaseQuad& base, Node& node) {
+  const Chart& chart = mass_.chart_of(quad);
   const std::span<const PieceMass> pieces = mass_.pieces_of(quad);
   held_count_ = 0;
   roots_.clear();
@@ -22,7 +22,7 @@ void QuadWalk<Curve>::hold_pieces(const QuadMass& quad, const BaseQuad& base, No
     roots_.push_back(static_cast<std::uint32_t>(held_count_));
     Held& held = push();
     held.frame = i;
-    held.piece = whole_piece<kDimensions>(sheet, mass_.curve.mesh, sheet.face_of(base, i));
+    held.piece = whole_piece<kDimensions>(chart, mass_.curve.mesh, chart.face_of(base, i));
     clip_to_box<kDimensions>(held.piece, node.low, node.size);
     held.integral = pieces[i].integral(held.piece.area_b() * frame(i).space);
   }

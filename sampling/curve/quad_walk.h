@@ -34,7 +34,7 @@ enum class PatchKind : std::uint8_t {
 template <int kDimensions>
 ToneIntegral integrate(const TriangleTone& tone, const Piece<kDimensions>& piece) {
   if (piece.corner_count < 3) return {};
-  std::array<Eigen::Vector2d, Piece<kDimensions>::kMostCorners> polygon;
+  std::array<Eigen::Vector2d, Piece<kDimensions>::kMaxCorners> polygon;
   for (std::uint32_t i = 0; i < piece.corner_count; ++i) polygon[i] = piece.corners[i].b;
   return tone.integrate({polygon.data(), piece.corner_count});
 }
@@ -72,7 +72,7 @@ class QuadWalk {
   void walk(std::size_t quad_index, Sink& sink) {
     const QuadMass& quad = mass_.quads[quad_index];
     const BaseQuad& base = mass_.base_quad(quad);
-    sheet_index_ = quad.sheet;
+    chart_index_ = quad.chart;
     quad_index_ = quad_index;
     Node node;
     node.low = base.low.template head<kDimensions>();
@@ -82,18 +82,18 @@ class QuadWalk {
     node.at = mass_.mass_before[quad_index];
     node.mass = mass_.mass_of(quad_index);
     if (!(node.mass > 0)) return;
-    store_.fetch(mass_.sheet_of(quad), base, frames_);
+    store_.fetch(mass_.chart_of(quad), base, frames_);
     if (rule_.uniform_depth < 0 && node.mass > rule_.small_mass() && quad.misplaced <= rule_.small_mass())
       return sink.take(*this, node, PatchKind::kEven);
-    hold_pieces(quad, base, node);
+    push_pieces(quad, base, node);
     divide(node, sink);
   }
 
   /// Goes on with pieces that the square has shrunk to nothing.
   template <class Sink>
-  void walk_pieces(std::uint32_t sheet, std::size_t quad_index, const std::vector<FaceFrame*>& frames,
+  void walk_pieces(std::uint32_t chart, std::size_t quad_index, const std::vector<FaceFrame*>& frames,
                    std::vector<Held> held, Node node, Sink& sink) {
-    sheet_index_ = sheet;
+    chart_index_ = chart;
     quad_index_ = quad_index;
     frames_ = frames;
     held_ = std::move(held);
@@ -104,7 +104,7 @@ class QuadWalk {
     divide(node, sink);
   }
 
-  std::uint32_t sheet() const { return sheet_index_; }
+  std::uint32_t chart() const { return chart_index_; }
   std::size_t quad() const { return quad_index_; }
   /// Of the base quad's faces.
   std::uint32_t frame_count() const { return static_cast<std::uint32_t>(frames_.size()); }
@@ -116,12 +116,12 @@ class QuadWalk {
 
  private:
   /// Quads get no smaller than this, relative to the square; what is still too much for one patch goes on in space.
-  static constexpr double kSmallest = 0x1p-46;
-  static constexpr int kMostLevels = 64;
+  static constexpr double kMin = 0x1p-46;
+  static constexpr int kMaxLevels = 64;
   /// What rounding leaves of a mass when all of it is taken away.
   static constexpr double kRoundingShare = 1e-12;
 
-  void hold_pieces(const QuadMass& quad, const BaseQuad& base, Node& node);
+  void push_pieces(const QuadMass& quad, const BaseQuad& base, Node& node);
   bool is_even(const Node& node) const;
   void cut_into_children(const Node& node, std::vector<std::vector<std::uint32_t>>& children);
   void distribute(const Node& node, std::uint32_t piece, int axis, unsigned place, unsigned stride,
@@ -140,9 +140,9 @@ class QuadWalk {
       if (node.mass <= rule_.small_mass()) return sink.take(*this, node, PatchKind::kSmall);
       if (kDimensions == 2 && is_even(node)) return sink.take(*this, node, PatchKind::kEven);
     }
-    if (level == kMostLevels) return sink.take(*this, node, PatchKind::kSmall);
+    if (level == kMaxLevels) return sink.take(*this, node, PatchKind::kSmall);
     if constexpr (kDimensions == 2)
-      if (node.size < kSmallest) return divide_in_space(node, sink);
+      if (node.size < kMin) return divide_in_space(node, sink);
     if (levels_.size() <= static_cast<std::size_t>(level)) levels_.emplace_back(new Level{});
     auto& children = levels_[static_cast<std::size_t>(level)]->children;
     const std::size_t held_before = held_count_;
@@ -184,7 +184,7 @@ class QuadWalk {
 
   const CurveMass::Implementation& mass_;
   PatchRule rule_;
-  std::uint32_t sheet_index_ = 0;
+  std::uint32_t chart_index_ = 0;
   std::size_t quad_index_ = 0;
   FaceFrames store_;
   std::vector<FaceFrame*> frames_;
@@ -221,7 +221,7 @@ void QuadWalk<Curve>::divide_in_space(const Node& node, Sink& sink) {
   there.at = node.at;
   there.mass = node.mass;
   there.scale = node.scale;
-  in_space_->walk_pieces(sheet_index_, quad_index_, frames_, std::move(held), there, sink);
+  in_space_->walk_pieces(chart_index_, quad_index_, frames_, std::move(held), there, sink);
 }
 
 extern template class QuadWalk<HilbertQuad>;

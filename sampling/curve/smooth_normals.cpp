@@ -11,7 +11,7 @@ constexpr double kSharpEdge = 40 * std::numbers::pi / 180;
 
 class CornerNormals {
  public:
-  CornerNormals(const TexturedMesh& mesh, const Neighbours& neighbours) : mesh_(mesh), neighbours_(neighbours) {
+  CornerNormals(const TexturedMesh& mesh, const Neighbors& neighbors) : mesh_(mesh), neighbors_(neighbors) {
     face_normals_.reserve(mesh.triangle_count());
     for (std::size_t t = 0; t < mesh.triangle_count(); ++t) face_normals_.push_back(mesh.area_vector(t).normalized());
     normals_.assign(mesh.triangle_count(), {Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()});
@@ -30,12 +30,12 @@ class CornerNormals {
     return cosine < std::cos(kSharpEdge) ? kNoSide : across;
   }
   TriangleSide clockwise(TriangleSide corner) const {
-    TriangleSide across = smooth_step(neighbours_[corner.triangle][corner.side], corner.triangle);
+    TriangleSide across = smooth_step(neighbors_[corner.triangle][corner.side], corner.triangle);
     if (across != kNoSide) across.side = static_cast<std::uint8_t>((across.side + 1) % 3);
     return across;
   }
   TriangleSide counter_clockwise(TriangleSide corner) const {
-    return smooth_step(neighbours_[corner.triangle][(corner.side + 2) % 3], corner.triangle);
+    return smooth_step(neighbors_[corner.triangle][(corner.side + 2) % 3], corner.triangle);
   }
 
   void fill_around(TriangleSide corner) {
@@ -68,7 +68,7 @@ class CornerNormals {
   }
 
   const TexturedMesh& mesh_;
-  const Neighbours& neighbours_;
+  const Neighbors& neighbors_;
   std::vector<Eigen::Vector3d> face_normals_;
   std::vector<std::array<Eigen::Vector3f, 3>> normals_;
 };
@@ -76,8 +76,8 @@ class CornerNormals {
 }  // namespace
 
 std::vector<std::array<Eigen::Vector3f, 3>> smooth_corner_normals(const TexturedMesh& mesh,
-                                                                  const Neighbours& neighbours) {
-  return CornerNormals(mesh, neighbours).take();
+                                                                  const Neighbors& neighbors) {
+  return CornerNormals(mesh, neighbors).take();
 }
 
 }  // namespace hilbrush

@@ -32,7 +32,7 @@ struct DotPlan {
   const CurveMass::Implementation& mass;
   Strata strata;
   PatchRule rule;
-  std::optional<Sequence> sequence;  ///< where along the curve; nothing: at the centres of strata
+  std::optional<Sequence> sequence;  ///< where along the curve; nothing: at the centers of strata
 };
 
 /// Whole strata one after another: add(from, to) for each, and its end.
@@ -204,7 +204,7 @@ class Walks {
 
   template <class Sink>
   void walk(std::size_t quad, Sink& sink) {
-    with_curve(plan_.mass.sheet_of(plan_.mass.quads[quad]).kind, [&]<class Curve>(Curve) {
+    with_curve(plan_.mass.chart_of(plan_.mass.quads[quad]).kind, [&]<class Curve>(Curve) {
       auto& walk = std::get<std::optional<QuadWalk<Curve>>>(walks_);
       if (!walk) walk.emplace(plan_.mass, plan_.rule);
       walk->walk(quad, sink);

@@ -32,7 +32,7 @@ SurfacePoint nearest_in_quad(const CurveMass::Implementation& mass, std::size_t 
   return nearest.point;
 }
 
-/// Of a run of base quads, the one whose centre of mass is nearest to `target_O`.
+/// Of a run of base quads, the one whose center of mass is nearest to `target_O`.
 std::size_t nearest_quad(const CurveMass::Implementation& mass, const StratumPart& part,
                          const Eigen::Vector3d& target_O) {
   std::size_t nearest = part.heaviest_quad;
@@ -63,17 +63,17 @@ SurfacePoint heaviest_point(const CurveMass::Implementation& mass, const Stratum
 SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad_index) {
   const QuadMass& quad = mass.quads[quad_index];
   const BaseQuad& base = mass.base_quad(quad);
-  const Sheet& sheet = mass.sheet_of(quad);
+  const Chart& chart = mass.chart_of(quad);
   const std::span<const PieceMass> pieces = mass.pieces_of(quad);
   const auto heaviest =
       std::ranges::max_element(pieces, [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; });
-  const SurfacePoint centre = surface_point(heaviest->triangle, heaviest->centre_b.cast<double>());
-  if (mass.tone.asked(centre) > 0) return centre;
+  const SurfacePoint center = surface_point(heaviest->triangle, heaviest->center_b.cast<double>());
+  if (mass.tone.asked(center) > 0) return center;
   std::vector<Eigen::Vector2d> polygon;
-  with_curve(sheet.kind, [&]<class Curve>(Curve) {
+  with_curve(chart.kind, [&]<class Curve>(Curve) {
     constexpr int kDimensions = kDimensionsOf<Curve>;
-    const SheetFace& face = sheet.face_of(base, static_cast<std::uint32_t>(heaviest - pieces.begin()));
-    auto piece = whole_piece<kDimensions>(sheet, mass.curve.mesh, face);
+    const ChartFace& face = chart.face_of(base, static_cast<std::uint32_t>(heaviest - pieces.begin()));
+    auto piece = whole_piece<kDimensions>(chart, mass.curve.mesh, face);
     clip_to_box<kDimensions>(piece, base.low.template head<kDimensions>(), base.size);
     for (const auto& corner : piece.all()) polygon.push_back(corner.b);
   });
@@ -84,7 +84,7 @@ bool is_surely_painted(double asked) {
   return asked >= kSurelyPainted;
 }
 
-PaintedPoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles,
+PaintedPoint center_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles,
                                const StratumPart& part) {
   SurfacePoint point;
   if (part.triangle != kNoTriangle) {
@@ -95,15 +95,15 @@ PaintedPoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangl
     const SurfacePoint start = part.heaviest_quad == StratumPart::kNoQuad
                                    ? part.heaviest
                                    : nearest_in_quad(mass, nearest_quad(mass, part, target), target);
-    point = walk_towards(mass.curve.mesh, mass.curve.neighbours, start, target);
+    point = walk_towards(mass.curve.mesh, mass.curve.neighbors, start, target);
   }
   const auto painted = [&](const SurfacePoint& place) {
     return PaintedPoint{place, triangles[place.triangle].asked(place.barycentric)};
   };
-  const PaintedPoint centre = painted(point);
-  if (is_surely_painted(centre.asked)) return centre;
+  const PaintedPoint center = painted(point);
+  if (is_surely_painted(center.asked)) return center;
   const PaintedPoint heaviest = painted(heaviest_point(mass, part));
-  return centre.asked > 0 && centre.asked >= kBlankShare * heaviest.asked ? centre : heaviest;
+  return center.asked > 0 && center.asked >= kBlankShare * heaviest.asked ? center : heaviest;
 }
 
 }  // namespace hilbrush

@@ -15,9 +15,9 @@ inline SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d&
   return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
 }
 
-/// The share of a stratum on one sheet: a stratum that spans two sheets puts its dot on one of them.
+/// The share of a stratum on one chart: a stratum that spans two charts puts its dot on one of them.
 struct StratumPart {
-  std::uint32_t sheet = 0;
+  std::uint32_t chart = 0;
   double mass = 0;
   Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times place
 
@@ -25,7 +25,7 @@ struct StratumPart {
   std::uint32_t triangle = kNoTriangle;
   Eigen::Vector2d moment_b = Eigen::Vector2d::Zero();
 
-  /// The centre of its heaviest bit, and the polygon that this is the centre of (empty: the bit is all painted).
+  /// The center of its heaviest bit, and the polygon that this is the center of (empty: the bit is all painted).
   double heaviest_mass = 0;
   SurfacePoint heaviest;
   std::array<Eigen::Vector2d, 12> polygon;
@@ -52,12 +52,12 @@ class Stratum {
   }
   bool is_empty() const { return !(current_.mass > 0) && !(best_.mass > 0); }
 
-  /// The part on `sheet`, to be added to.
-  StratumPart& on(std::uint32_t sheet) {
-    if (current_.sheet != sheet) {
+  /// The part on `chart`, to be added to.
+  StratumPart& on(std::uint32_t chart) {
+    if (current_.chart != chart) {
       if (current_.mass > best_.mass) best_ = current_;
       current_.clear();
-      current_.sheet = sheet;
+      current_.chart = chart;
     }
     return current_;
   }
@@ -76,8 +76,8 @@ struct PaintedPoint {
   double asked = 0;
 };
 
-/// The stratum's centre of mass, put back on the surface; where that is blank, a painted point of its heaviest bit.
-PaintedPoint centre_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles, const StratumPart& part);
+/// The stratum's center of mass, put back on the surface; where that is blank, a painted point of its heaviest bit.
+PaintedPoint center_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles, const StratumPart& part);
 
 /// A painted point of a base quad that has mass, in the triangle that has most.
 SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad);

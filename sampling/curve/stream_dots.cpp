@@ -18,7 +18,7 @@ namespace {
 
 /// Dots are made in blocks whose size depends on nothing but their number, so that the result does not depend on the
 /// threads.
-constexpr std::uint64_t kMostDotsInBlock = 4096, kLeastDotsInBlock = 128, kBlocksAtLeast = 64;
+constexpr std::uint64_t kMaxDotsInBlock = 4096, kMinDotsInBlock = 128, kBlocksAtLeast = 64;
 /// So many blocks are made at once, while the visitor has as many.
 constexpr std::uint64_t kBlocksAtOnce = 32;
 
@@ -52,9 +52,9 @@ class PathMeter {
   }
 
   void finish(std::uint64_t count) {
-    for (std::size_t s = 0; s < mass_.curve.sheets.size(); ++s) {
+    for (std::size_t s = 0; s < mass_.curve.charts.size(); ++s) {
       report_.painted_area_m2 += mass_.painted_area_m2[s];
-      report_.components[mass_.curve.sheets[s].component].painted_area_m2 += mass_.painted_area_m2[s];
+      report_.components[mass_.curve.charts[s].component].painted_area_m2 += mass_.painted_area_m2[s];
     }
     if (count > 1) report_.path_constant = constant(report_.path_length_m, count, report_.painted_area_m2);
     for (ComponentPath& component : report_.components)
@@ -80,7 +80,7 @@ class BlockStream {
   explicit BlockStream(const DotPlan& plan)
       : plan_(plan),
         makers_([&plan] { return BlockMaker(plan); }),
-        block_size_(std::clamp(plan.strata.count / kBlocksAtLeast, kLeastDotsInBlock, kMostDotsInBlock)),
+        block_size_(std::clamp(plan.strata.count / kBlocksAtLeast, kMinDotsInBlock, kMaxDotsInBlock)),
         block_count_((plan.strata.count + block_size_ - 1) / block_size_) {}
 
   template <class Visit>

@@ -6,7 +6,7 @@
 #include "sampling/curve/stream_dots.h"
 #include "sampling/model/edges.h"
 
-/// What SurfaceCurve keeps of a mesh: sheets with their base trees, and what a dot needs to know of its surroundings.
+/// What SurfaceCurve keeps of a mesh: charts with their base trees, and what a dot needs to know of its surroundings.
 namespace hilbrush {
 
 /// What a dot takes from its triangle.
@@ -20,17 +20,16 @@ struct SurfaceCurve::Implementation {
   explicit Implementation(const TexturedMesh& m) : mesh(m) {}
 
   const TexturedMesh& mesh;
-  Neighbours neighbours;
+  Neighbors neighbors;
   std::vector<ComponentReport> components;
-  std::vector<Sheet> sheets;  ///< in the order in which they are walked
+  std::vector<Chart> charts;  ///< in the order in which they are walked
   std::vector<DotSurface> dot_surfaces;
 };
 
-std::vector<DotSurface> find_dot_surfaces(const TexturedMesh& mesh, const Neighbours& neighbours);
+std::vector<DotSurface> find_dot_surfaces(const TexturedMesh& mesh, const Neighbors& neighbors);
 
 /// Unit normals per corner: the mean, weighted by angle, over the triangles around the vertex up to the next sharp
 /// edge.
-std::vector<std::array<Eigen::Vector3f, 3>> smooth_corner_normals(const TexturedMesh& mesh,
-                                                                  const Neighbours& neighbours);
+std::vector<std::array<Eigen::Vector3f, 3>> smooth_corner_normals(const TexturedMesh& mesh, const Neighbors& neighbors);
 
 }  // namespace hilbrush

@@ -24,7 +24,7 @@ inline SurfacePoint surface_point_at(const TexturedMesh& mesh, std::uint32_t tri
 inline bool move_to(SurfacePlace& place, const SurfaceCurve& curve, const ToneField& tone,
                     const Eigen::Vector3d& target_O) {
   const SurfacePoint start{place.triangle, {}};
-  const SurfacePoint point = walk_towards(curve.mesh(), curve.implementation().neighbours, start, target_O);
+  const SurfacePoint point = walk_towards(curve.mesh(), curve.implementation().neighbors, start, target_O);
   if (!(tone.asked(point) > 0)) return false;
   place.position_O = position(curve.mesh(), point);
   place.triangle = point.triangle;

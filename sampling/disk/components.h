@@ -19,14 +19,14 @@ struct Component {
 };
 
 /// Triangles hang together over shared edges; the components are in order of their first triangles. Cost O(n).
-std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbours& neighbours);
+std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbors& neighbors);
 
 /// The shape of some triangles, rising, that hang together by themselves: sides to other triangles are boundary.
-Component describe_component(const TexturedMesh& mesh, const Neighbours& neighbours,
+Component describe_component(const TexturedMesh& mesh, const Neighbors& neighbors,
                              std::vector<std::uint32_t> triangles);
 
-/// All loops of sides without a neighbour, in order of their first sides.
-std::vector<BoundaryLoop> boundary_loops(const Neighbours& neighbours);
+/// All loops of sides without a neighbor, in order of their first sides.
+std::vector<BoundaryLoop> boundary_loops(const Neighbors& neighbors);
 
 /// Numbers the fans of a mesh: all corners that hang together around a vertex get the same number, in order of their
 /// first corners. Returns the numbers by triangle and how many there are.
@@ -34,6 +34,6 @@ struct Fans {
   std::vector<Triangle> of_corners;
   std::uint32_t count = 0;
 };
-Fans find_fans(const Neighbours& neighbours);
+Fans find_fans(const Neighbors& neighbors);
 
 }  // namespace hilbrush

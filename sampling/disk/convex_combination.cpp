@@ -18,7 +18,7 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double kLeastWeight = 1e-4, kMostWeight = 1e3;
+constexpr double kMinWeight = 1e-4, kMaxWeight = 1e3;
 /// Below this METIS has nothing to gain.
 constexpr std::size_t kSmallGraph = 2000;
 
@@ -28,9 +28,9 @@ double cotan_half(const Disk& disk, std::uint32_t face, std::size_t from, std::s
   const Eigen::Vector3d u = disk.positions()[f[from]] - disk.positions()[f[apex]];
   const Eigen::Vector3d v = disk.positions()[f[to]] - disk.positions()[f[apex]];
   const double sine = u.cross(v).norm(), cosine = u.dot(v);
-  // Of a triangle (almost) without area a finite share, so that its neighbour's still counts.
-  constexpr double kMostHalf = 100 * kMostWeight;
-  return std::abs(cosine) < 2 * kMostHalf * sine ? .5 * cosine / sine : std::copysign(kMostHalf, cosine);
+  // Of a triangle (almost) without area a finite share, so that its neighbor's still counts.
+  constexpr double kMaxHalf = 100 * kMaxWeight;
+  return std::abs(cosine) < 2 * kMaxHalf * sine ? .5 * cosine / sine : std::copysign(kMaxHalf, cosine);
 }
 
 double mean_value_half(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to) {
@@ -47,7 +47,7 @@ WeightedGraph make_graph(const Disk& disk, Half half, Limit limit) {
   WeightedGraph graph;
   const auto& faces = disk.faces();
   const auto is_first = [&](TriangleSide side) {
-    const TriangleSide across = disk.neighbours()[side.triangle][side.side];
+    const TriangleSide across = disk.neighbors()[side.triangle][side.side];
     return across == kNoSide || side.triangle < across.triangle ||
            (side.triangle == across.triangle && side.side < across.side);
   };
@@ -68,7 +68,7 @@ WeightedGraph make_graph(const Disk& disk, Half half, Limit limit) {
   for_each_edge([&](TriangleSide side) {
     const std::size_t i = side.side, j = (i + 1) % 3;
     double forward = half(disk, side.triangle, i, j), back = half(disk, side.triangle, j, i);
-    if (const TriangleSide across = disk.neighbours()[side.triangle][side.side]; across != kNoSide) {
+    if (const TriangleSide across = disk.neighbors()[side.triangle][side.side]; across != kNoSide) {
       const std::size_t k = across.side, l = (k + 1) % 3;
       forward += half(disk, across.triangle, l, k);
       back += half(disk, across.triangle, k, l);
@@ -154,7 +154,7 @@ std::vector<std::uint32_t> dissected(const WeightedGraph& graph) {
   const std::lock_guard lock(metis);
   std::array<idx_t, METIS_NOPTIONS> options{};
   METIS_SetDefaultOptions(options.data());
-  options[METIS_OPTION_COMPRESS] = 0;  // no two vertices of a mesh have the same neighbours
+  options[METIS_OPTION_COMPRESS] = 0;  // no two vertices of a mesh have the same neighbors
   const int result =
       METIS_NodeND(&vertex_count, begin.data(), to.data(), nullptr, options.data(), order.data(), place.data());
   CHECK(result == METIS_OK);
@@ -178,7 +178,7 @@ std::vector<std::uint32_t> least_degree(const WeightedGraph& graph) {
 }  // namespace
 
 WeightedGraph cotan_graph(const Disk& disk) {
-  return make_graph(disk, cotan_half, [](double weight) { return std::clamp(weight, kLeastWeight, kMostWeight); });
+  return make_graph(disk, cotan_half, [](double weight) { return std::clamp(weight, kMinWeight, kMaxWeight); });
 }
 
 WeightedGraph mean_value_graph(const Disk& disk) {

@@ -5,7 +5,7 @@
 
 #include "sampling/disk/disk.h"
 
-/// Maps in which every inner vertex is a weighted mean of its neighbours (Tutte 1963, Floater 1997): the weights, and
+/// Maps in which every inner vertex is a weighted mean of its neighbors (Tutte 1963, Floater 1997): the weights, and
 /// the sparse solve.
 namespace hilbrush {
 
@@ -27,7 +27,7 @@ WeightedGraph mean_value_graph(const Disk& disk);
 /// An order of elimination with little fill-in (nested dissection by METIS), the same for any set of fixed vertices.
 std::vector<std::uint32_t> elimination_order(const WeightedGraph& graph);
 
-/// Solves for the vertices that are not fixed: each becomes the mean of its neighbours. Row v of `values` is vertex
+/// Solves for the vertices that are not fixed: each becomes the mean of its neighbors. Row v of `values` is vertex
 /// v's. Fixed ones are given, the others are written. False if the factor fails. Symmetric weights: a Cholesky factor,
 /// about .7 s for 134,000 vertices.
 bool solve_symmetric(const WeightedGraph& graph, const std::vector<std::uint32_t>& order,

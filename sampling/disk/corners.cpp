@@ -12,9 +12,9 @@ namespace {
 
 /// A boundary vertex that turns by more is a corner of the shape itself.
 constexpr double kShapeCornerTurn = std::numbers::pi / 4;
-constexpr double kLeastSideShare = .005;
+constexpr double kMinSideShare = .005;
 /// Of more forks than these none is tried as a corner.
-constexpr std::size_t kMostForks = 16;
+constexpr std::size_t kMaxForks = 16;
 
 /// A slit's corners, as a share of the loop from its tips: where tan(x) = (sqrt(2) - 1)^2 for a quarter turn x a half.
 const double kSlitCorner = std::atan(3 - 2 * std::numbers::sqrt2) / std::numbers::pi;
@@ -53,7 +53,7 @@ std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<do
   while (sharp.size() < 4) add_middle_of_longest(sharp, along);
   const Corners corners{sharp[0], sharp[1], sharp[2], sharp[3]};
   const auto sides = side_lengths(corners, along);
-  if (*std::min_element(sides.begin(), sides.end()) < kLeastSideShare * along.back()) return std::nullopt;
+  if (*std::min_element(sides.begin(), sides.end()) < kMinSideShare * along.back()) return std::nullopt;
   return corners;
 }
 
@@ -75,7 +75,7 @@ std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<do
   std::vector<std::size_t> forks;
   for (std::size_t i = 0; i < cut.outer.size(); ++i)
     if (std::ranges::find(cut.forks, cut.disk.from(cut.outer[i])) != cut.forks.end()) forks.push_back(i);
-  if (forks.size() < 4 || forks.size() > kMostForks) return std::nullopt;
+  if (forks.size() < 4 || forks.size() > kMaxForks) return std::nullopt;
   std::optional<Corners> best;
   double best_score = std::numeric_limits<double>::infinity();
   const std::size_t n = forks.size();
@@ -87,7 +87,7 @@ std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<do
           const auto sides = side_lengths(corners, along);
           const double shortest = *std::min_element(sides.begin(), sides.end());
           const double score = std::abs(sides[0] - sides[2]) + std::abs(sides[1] - sides[3]) - .1 * shortest;
-          if (shortest > kLeastSideShare * along.back() && score < best_score) best = corners, best_score = score;
+          if (shortest > kMinSideShare * along.back() && score < best_score) best = corners, best_score = score;
         }
   return best;
 }

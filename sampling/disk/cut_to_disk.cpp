@@ -14,12 +14,12 @@ namespace hilbrush {
 namespace {
 
 /// Sides of an outer boundary are split until none is longer than this share of all of it.
-constexpr double kLongestBoundarySide = 1. / 16;
+constexpr double kMaxBoundarySide = 1. / 16;
 /// Faces that a whole mesh may get, shared out by area, and a component at most, before needles are looked at ...
 constexpr double kRefinedMesh = 40'000, kRefinedComponent = 5000;
-/// ... and towards Delaunay; then no component grows beyond kMostGrowth times its own, but all may to kLeastGrowth
+/// ... and towards Delaunay; then no component grows beyond kMaxGrowth times its own, but all may to kMinGrowth
 /// times.
-constexpr double kDelaunayMesh = 200'000, kDelaunayComponent = 80'000, kMostGrowth = 16, kLeastGrowth = 1.1;
+constexpr double kDelaunayMesh = 200'000, kDelaunayComponent = 80'000, kMaxGrowth = 16, kMinGrowth = 1.1;
 /// A disk with a shorter boundary, over the root of its area, is a bag: it is slit from its mouth to the far end.
 constexpr double kShortestBoundary = 1.2;
 /// So many roots are tried for the loops that open handles.
@@ -103,7 +103,7 @@ double length_of(const Disk& disk, const std::vector<TriangleSide>& sides) {
 
 /// Longest loop first.
 std::vector<BoundaryLoop> sorted_loops(const Disk& disk) {
-  std::vector<BoundaryLoop> loops = boundary_loops(disk.neighbours());
+  std::vector<BoundaryLoop> loops = boundary_loops(disk.neighbors());
   std::ranges::stable_sort(loops, std::greater<>(), [&](const BoundaryLoop& loop) { return length_of(disk, loop); });
   return loops;
 }
@@ -120,7 +120,7 @@ std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& dista
   std::vector<Candidate> candidates;
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s) {
-      const TriangleSide side{f, s}, across = disk.neighbours()[f][s];
+      const TriangleSide side{f, s}, across = disk.neighbors()[f][s];
       if (across == kNoSide || across.triangle < f || (across.triangle == f && across.side < s)) continue;
       const TriangleSide to_from = distances.last_side[disk.from(side)], to_to = distances.last_side[disk.to(side)];
       if (to_from == side || to_from == across || to_to == side || to_to == across) continue;
@@ -138,7 +138,7 @@ std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& dista
   std::vector<TriangleSide> closing;
   for (const Candidate& candidate : candidates) {
     const std::uint32_t a = find(candidate.side.triangle);
-    const std::uint32_t b = find(disk.neighbours()[candidate.side.triangle][candidate.side.side].triangle);
+    const std::uint32_t b = find(disk.neighbors()[candidate.side.triangle][candidate.side.side].triangle);
     if (a != b)
       parent[a] = b;
     else
@@ -182,7 +182,7 @@ std::vector<char> boundary_vertices(const Disk& disk) {
   std::vector<char> is_boundary(disk.positions().size(), 0);
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s)
-      if (disk.neighbours()[f][s] == kNoSide) is_boundary[disk.from({f, s})] = is_boundary[disk.to({f, s})] = 1;
+      if (disk.neighbors()[f][s] == kNoSide) is_boundary[disk.from({f, s})] = is_boundary[disk.to({f, s})] = 1;
   return is_boundary;
 }
 
@@ -222,7 +222,7 @@ std::vector<Eigen::Vector3d> forks_of(const Disk& disk, const std::vector<Triang
 
 void split_long_sides(CutDisk& cut) {
   const std::uint32_t start = cut.disk.from(cut.outer[0]);
-  const double longest = kLongestBoundarySide * length_of(cut.disk, cut.outer);
+  const double longest = kMaxBoundarySide * length_of(cut.disk, cut.outer);
   for (bool is_done = false; !is_done;) {
     is_done = true;
     std::vector<char> is_split(cut.disk.faces().size(), 0);
@@ -248,8 +248,8 @@ std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loo
 void refine_for_map(Disk& disk, double area_share) {
   refine(disk, static_cast<std::size_t>(std::min(kRefinedMesh * area_share, kRefinedComponent)));
   const auto n = static_cast<double>(disk.faces().size());
-  const double budget = std::min({kDelaunayMesh * area_share, kDelaunayComponent, kMostGrowth * n});
-  const double most = std::max(kLeastGrowth * n, budget);
+  const double budget = std::min({kDelaunayMesh * area_share, kDelaunayComponent, kMaxGrowth * n});
+  const double most = std::max(kMinGrowth * n, budget);
   split_towards_delaunay(disk, static_cast<std::size_t>(most));
 }
 
@@ -265,7 +265,7 @@ bool open_cuts(CutDisk& cut, const std::vector<TriangleSide>& edges, const Marks
   cut.cut_length_m += length_of(cut.disk, edges);
   for (const TriangleSide side : edges) cut.disk.cut_edge(side);
   cut.disk.finish_cuts();
-  std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbours());
+  std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbors());
   if (loops.size() != 1) return false;
   cut.outer = marks.start ? loop_from(cut.disk, cut.disk.from(*marks.start)) : std::move(loops.front());
   cut.forks = vertices_at(cut.disk, cut.outer, marks.forks);
@@ -283,19 +283,19 @@ void fill_holes(Disk& disk, std::size_t most_holes) {
 }  // namespace
 
 BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
-  BoundaryLoop loop = std::move(boundary_loops(disk.neighbours()).front());
+  BoundaryLoop loop = std::move(boundary_loops(disk.neighbors()).front());
   const auto first = std::find_if(loop.begin(), loop.end(), [&](TriangleSide s) { return disk.from(s) == vertex; });
   std::rotate(loop.begin(), first, loop.end());
   return loop;
 }
 
-std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
+std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                                    std::string& reason, const CutOptions& options) {
   if (component.genus < 0) {
     reason = "its triangles do not form a surface";
     return std::nullopt;
   }
-  CutDisk cut{Disk(mesh, neighbours, component.triangles), {}, false, 0, {}};
+  CutDisk cut{Disk(mesh, neighbors, component.triangles), {}, false, 0, {}};
   Disk& disk = cut.disk;
   refine_for_map(disk, options.area_share);
   fill_holes(disk, options.most_holes);

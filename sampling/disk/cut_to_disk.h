@@ -30,7 +30,7 @@ struct CutOptions {
 /// several boundaries: along the shortest arcs from boundary to boundary (or from one vertex back to it) that leave a
 /// disk; a bag with a small mouth is slit. A hole that is filled instead makes the curve jump across it. Returns
 /// nothing, and a reason, for what is not a manifold. Cost O(n log n).
-std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
+std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                                    std::string& reason, const CutOptions& options = {});
 
 /// Cuts from the boundary to that one of the given vertices that lies deepest inside: a long finger, which the map

@@ -7,7 +7,7 @@
 
 namespace hilbrush {
 
-Disk::Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<std::uint32_t>& triangles) {
+Disk::Disk(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<std::uint32_t>& triangles) {
   const auto side_of = [&](TriangleSide other) {
     const auto at = std::lower_bound(triangles.begin(), triangles.end(), other.triangle);
     if (at == triangles.end() || *at != other.triangle) return kNoSide;
@@ -16,11 +16,11 @@ Disk::Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::ve
   for (const auto t : triangles) {
     faces_.push_back(mesh.triangles[t]);
     sources_.push_back({t, {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}});
-    neighbours_.push_back(neighbours[t]);
-    for (TriangleSide& other : neighbours_.back())
+    neighbors_.push_back(neighbors[t]);
+    for (TriangleSide& other : neighbors_.back())
       if (other != kNoSide) other = side_of(other);
   }
-  const Fans fans = find_fans(neighbours_);
+  const Fans fans = find_fans(neighbors_);
   positions_.resize(fans.count);
   for (std::size_t f = 0; f < faces_.size(); ++f)
     for (std::size_t c = 0; c < 3; ++c) positions_[fans.of_corners[f][c]] = mesh.vertices[faces_[f][c]];
@@ -37,7 +37,7 @@ double Disk::angle(std::uint32_t face, std::size_t corner) const {
 std::uint32_t Disk::split_edge(TriangleSide s, double share) {
   const auto middle = static_cast<std::uint32_t>(positions_.size());
   positions_.push_back((1 - share) * positions_[from(s)] + share * positions_[to(s)]);
-  const TriangleSide across = neighbours_[s.triangle][s.side];
+  const TriangleSide across = neighbors_[s.triangle][s.side];
   // Cuts one face from the middle of a side to its apex: it keeps the first half, a new face takes the second.
   const auto halve = [&](TriangleSide side, double f_share) {
     const auto [f, i] = side;
@@ -50,29 +50,29 @@ std::uint32_t Disk::split_edge(TriangleSide s, double share) {
     faces_.push_back({middle, faces_[f][j], faces_[f][k]});
     faces_[f][j] = middle;
     sources_.push_back(second);
-    const TriangleSide beyond = neighbours_[f][j];
-    neighbours_.push_back({kNoSide, beyond, {f, static_cast<std::uint8_t>(j)}});
-    if (beyond != kNoSide) neighbours_[beyond.triangle][beyond.side] = {added, 1};
-    neighbours_[f][j] = {added, 2};
+    const TriangleSide beyond = neighbors_[f][j];
+    neighbors_.push_back({kNoSide, beyond, {f, static_cast<std::uint8_t>(j)}});
+    if (beyond != kNoSide) neighbors_[beyond.triangle][beyond.side] = {added, 1};
+    neighbors_[f][j] = {added, 2};
     return added;
   };
   const std::uint32_t second = halve(s, share);
   if (across == kNoSide) return middle;
   const std::uint32_t second_across = halve(across, 1 - share);
-  neighbours_[s.triangle][s.side] = {second_across, 0};
-  neighbours_[second_across][0] = s;
-  neighbours_[second][0] = across;
-  neighbours_[across.triangle][across.side] = {second, 0};
+  neighbors_[s.triangle][s.side] = {second_across, 0};
+  neighbors_[second_across][0] = s;
+  neighbors_[second][0] = across;
+  neighbors_[across.triangle][across.side] = {second, 0};
   return middle;
 }
 
 void Disk::cut_edge(TriangleSide s) {
-  const TriangleSide across = std::exchange(neighbours_[s.triangle][s.side], kNoSide);
-  if (across != kNoSide) neighbours_[across.triangle][across.side] = kNoSide;
+  const TriangleSide across = std::exchange(neighbors_[s.triangle][s.side], kNoSide);
+  if (across != kNoSide) neighbors_[across.triangle][across.side] = kNoSide;
 }
 
 void Disk::finish_cuts() {
-  Fans fans = find_fans(neighbours_);
+  Fans fans = find_fans(neighbors_);
   std::vector<Eigen::Vector3d> positions(fans.count);
   for (std::size_t f = 0; f < faces_.size(); ++f)
     for (std::size_t c = 0; c < 3; ++c) positions[fans.of_corners[f][c]] = positions_[faces_[f][c]];
@@ -83,11 +83,11 @@ void Disk::finish_cuts() {
 void Disk::fill(const BoundaryLoop& loop) {
   if (loop.size() == 2) {
     // A slit: its sides go together again.
-    neighbours_[loop[0].triangle][loop[0].side] = loop[1];
-    neighbours_[loop[1].triangle][loop[1].side] = loop[0];
+    neighbors_[loop[0].triangle][loop[0].side] = loop[1];
+    neighbors_[loop[1].triangle][loop[1].side] = loop[0];
     return;
   }
-  const auto centre = static_cast<std::uint32_t>(positions_.size());
+  const auto center = static_cast<std::uint32_t>(positions_.size());
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const TriangleSide s : loop) sum += positions_[from(s)];
   positions_.push_back(sum / static_cast<double>(loop.size()));
@@ -95,10 +95,10 @@ void Disk::fill(const BoundaryLoop& loop) {
   const auto n = static_cast<std::uint32_t>(loop.size());
   for (std::uint32_t i = 0; i < n; ++i) {
     const TriangleSide s = loop[i];
-    faces_.push_back({to(s), from(s), centre});
+    faces_.push_back({to(s), from(s), center});
     sources_.push_back({});
-    neighbours_.push_back({s, {first + (i + n - 1) % n, 2}, {first + (i + 1) % n, 1}});
-    neighbours_[s.triangle][s.side] = {first + i, 0};
+    neighbors_.push_back({s, {first + (i + n - 1) % n, 2}, {first + (i + 1) % n, 1}});
+    neighbors_[s.triangle][s.side] = {first + i, 0};
   }
 }
 

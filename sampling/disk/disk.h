@@ -20,12 +20,12 @@ struct FaceSource {
 class Disk {
  public:
   /// `triangles` rising, as in Component; sides to other triangles are boundary.
-  Disk(const TexturedMesh& mesh, const Neighbours& neighbours, const std::vector<std::uint32_t>& triangles);
+  Disk(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<std::uint32_t>& triangles);
 
   const std::vector<Triangle>& faces() const { return faces_; }
   const std::vector<FaceSource>& sources() const { return sources_; }
-  const Neighbours& neighbours() const { return neighbours_; }
-  const std::vector<Eigen::Vector3d>& positions() const { return positions_; }  ///< per vertex, metres
+  const Neighbors& neighbors() const { return neighbors_; }
+  const std::vector<Eigen::Vector3d>& positions() const { return positions_; }  ///< per vertex, meters
 
   std::uint32_t from(TriangleSide s) const { return faces_[s.triangle][s.side]; }
   std::uint32_t to(TriangleSide s) const { return faces_[s.triangle][(s.side + 1) % 3]; }
@@ -46,7 +46,7 @@ class Disk {
  private:
   std::vector<Triangle> faces_;
   std::vector<FaceSource> sources_;
-  Neighbours neighbours_;
+  Neighbors neighbors_;
   std::vector<Eigen::Vector3d> positions_;
 };
 

@@ -13,7 +13,7 @@ namespace hilbrush {
 namespace {
 
 /// A component is divided so many times, and no piece with fewer triangles is.
-constexpr int kMostDivisions = 8;
+constexpr int kMaxDivisions = 8;
 constexpr std::size_t kFewestToDivide = 40;
 
 std::array<Eigen::Vector3d, 4> corner_positions(const CutDisk& cut, const SquareMap& map) {
@@ -43,15 +43,15 @@ FlatPiece make_piece(const CutDisk& cut, const SquareMap& map) {
   return piece;
 }
 
-/// The two halves of a component: what is nearer to one of two far ends, by way of the triangles' centres.
-std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const Neighbours& neighbours,
+/// The two halves of a component: what is nearer to one of two far ends, by way of the triangles' centers.
+std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const Neighbors& neighbors,
                                                  const std::vector<std::uint32_t>& triangles) {
   const std::size_t n = triangles.size();
   const auto local = [&](std::uint32_t t) {
     const auto at = std::lower_bound(triangles.begin(), triangles.end(), t);
     return at != triangles.end() && *at == t ? static_cast<std::size_t>(at - triangles.begin()) : n;
   };
-  const auto centre = [&](std::size_t i) {
+  const auto center = [&](std::size_t i) {
     return Eigen::Vector3d(
         (mesh.corner(triangles[i], 0) + mesh.corner(triangles[i], 1) + mesh.corner(triangles[i], 2)) / 3);
   };
@@ -72,10 +72,10 @@ std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const
       const auto [distance, i] = queue.top();
       queue.pop();
       if (distance > ways.distance[i]) continue;
-      for (const TriangleSide other : neighbours[triangles[i]]) {
+      for (const TriangleSide other : neighbors[triangles[i]]) {
         const std::size_t j = other == kNoSide ? n : local(other.triangle);
         if (j == n) continue;
-        const double longer = distance + (centre(j) - centre(i)).norm();
+        const double longer = distance + (center(j) - center(i)).norm();
         if (longer >= ways.distance[j]) continue;
         ways.distance[j] = longer;
         ways.source[j] = ways.source[i];
@@ -97,11 +97,11 @@ std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const
 
 class Flattening {
  public:
-  Flattening(const TexturedMesh& mesh, const Neighbours& neighbours, double area_share, double area_m2)
-      : mesh_(mesh), neighbours_(neighbours), share_per_m2_(area_m2 > 0 ? area_share / area_m2 : 0) {}
+  Flattening(const TexturedMesh& mesh, const Neighbors& neighbors, double area_share, double area_m2)
+      : mesh_(mesh), neighbors_(neighbors), share_per_m2_(area_m2 > 0 ? area_share / area_m2 : 0) {}
 
   FlatComponent run(const Component& component) {
-    add(component, kMostDivisions);
+    add(component, kMaxDivisions);
     if (area_ > 0) result_.shear = sheared_ / area_;
     if (result_.pieces.size() > 1)
       result_.reason = "divided into " + std::to_string(result_.pieces.size()) + " pieces: " + result_.reason;
@@ -119,8 +119,8 @@ class Flattening {
       return;
     }
     is_divided_ = true;
-    for (const auto& triangles : halves(mesh_, neighbours_, component.triangles))
-      add(describe_component(mesh_, neighbours_, triangles), divisions - 1);
+    for (const auto& triangles : halves(mesh_, neighbors_, component.triangles))
+      add(describe_component(mesh_, neighbors_, triangles), divisions - 1);
   }
 
   bool add_whole(const Component& component) {
@@ -129,7 +129,7 @@ class Flattening {
     const bool has_holes = component.boundary_loops > 1;
     for (int attempt = 0; attempt < (has_holes ? 2 : 1); ++attempt) {
       if (attempt == 1) options.most_holes = 0;
-      auto cut = cut_to_disk(mesh_, neighbours_, component, result_.reason, options);
+      auto cut = cut_to_disk(mesh_, neighbors_, component, result_.reason, options);
       if (!cut) return false;
       const auto map = map_to_square(*cut);
       if (map) {
@@ -146,7 +146,7 @@ class Flattening {
   }
 
   const TexturedMesh& mesh_;
-  const Neighbours& neighbours_;
+  const Neighbors& neighbors_;
   double share_per_m2_;
   double sheared_ = 0, area_ = 0;
   bool is_divided_ = false;
@@ -177,9 +177,9 @@ std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh, const std::
   return nearest;
 }
 
-FlatComponent flatten(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
+FlatComponent flatten(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                       double area_share) {
-  return Flattening(mesh, neighbours, area_share, component.area_m2).run(component);
+  return Flattening(mesh, neighbors, area_share, component.area_m2).run(component);
 }
 
 }  // namespace hilbrush

@@ -43,7 +43,7 @@ std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh, const std::
 
 /// `area_share` of the whole mesh's surface decides how much the component may be refined. Deterministic, may be called
 /// from several threads. Cost as cut_to_disk and map_to_square; a component that resists, a few times that.
-FlatComponent flatten(const TexturedMesh& mesh, const Neighbours& neighbours, const Component& component,
+FlatComponent flatten(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                       double area_share);
 
 }  // namespace hilbrush

@@ -10,16 +10,16 @@ namespace hilbrush {
 namespace {
 
 /// Rounding makes angles of rectangles sum to a little more than 180 degrees.
-constexpr double kLeastExcess = 1e-6;
+constexpr double kMinExcess = 1e-6;
 /// No edge is split nearer to its ends, nor if it is shorter than this share of a mean face's side.
 constexpr double kNearestToEnd = .05;
 constexpr double kShortestSplit = .01;
 /// Sine over cosine of an angle that counts as 180 degrees.
-constexpr double kSmallestSine = 1e-6;
+constexpr double kMinSine = 1e-6;
 /// Nothing less urgent than this share of the whole area is split: it changes the map too little.
-constexpr double kLeastUrgency = 1e-4;
+constexpr double kMinUrgency = 1e-4;
 /// Worse weights than this are all as urgent, so that length decides between needles.
-constexpr double kMostDeficit = 10;
+constexpr double kMaxDeficit = 10;
 
 /// A queue of the sides whose `urgency` is above 0, most urgent first.
 template <class Urgency>
@@ -64,7 +64,7 @@ void split_most_urgent(Disk& disk, std::size_t face_count, Urgency urgency, Shar
   while (disk.faces().size() < face_count) {
     const TriangleSide side = queue.pop();
     if (side == kNoSide) return;
-    const TriangleSide across = disk.neighbours()[side.triangle][side.side];
+    const TriangleSide across = disk.neighbors()[side.triangle][side.side];
     const std::size_t first_new = disk.faces().size();
     disk.split_edge(side, share(side));
     queue.push_changed(side.triangle, across, first_new);
@@ -88,18 +88,18 @@ struct Apex {
 /// How far below 0 the cotan weight of an edge is, times its length squared: what clamping it does to the map's energy.
 double negative_energy(const Disk& disk, TriangleSide s) {
   const Apex here(disk, s);
-  double cotans = here.cosine / std::max(here.sine, kSmallestSine * std::abs(here.cosine));
-  if (const TriangleSide across = disk.neighbours()[s.triangle][s.side]; across != kNoSide) {
+  double cotans = here.cosine / std::max(here.sine, kMinSine * std::abs(here.cosine));
+  if (const TriangleSide across = disk.neighbors()[s.triangle][s.side]; across != kNoSide) {
     const Apex there(disk, across);
-    cotans += there.cosine / std::max(there.sine, kSmallestSine * std::abs(there.cosine));
+    cotans += there.cosine / std::max(there.sine, kMinSine * std::abs(there.cosine));
   }
-  return cotans < -kLeastExcess ? std::min(-cotans, kMostDeficit) * disk.length(s) * disk.length(s) : 0;
+  return cotans < -kMinExcess ? std::min(-cotans, kMaxDeficit) * disk.length(s) * disk.length(s) : 0;
 }
 
 double foot_of_blunter(const Disk& disk, TriangleSide s) {
   const Apex here(disk, s);
   double share = here.foot;
-  if (const TriangleSide across = disk.neighbours()[s.triangle][s.side]; across != kNoSide) {
+  if (const TriangleSide across = disk.neighbors()[s.triangle][s.side]; across != kNoSide) {
     const Apex there(disk, across);
     if (there.cosine * here.sine < here.cosine * there.sine) share = 1 - there.foot;
   }
@@ -121,7 +121,7 @@ void refine(Disk& disk, std::size_t face_count) {
 
 void split_towards_delaunay(Disk& disk, std::size_t most_faces) {
   const double side = mean_side(disk), shortest = kShortestSplit * side;
-  const double least = kLeastUrgency * side * side * static_cast<double>(disk.faces().size());
+  const double least = kMinUrgency * side * side * static_cast<double>(disk.faces().size());
   split_most_urgent(
       disk, most_faces,
       [&](TriangleSide s) {

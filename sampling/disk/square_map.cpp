@@ -16,15 +16,15 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 /// Strips are mapped onto at most so many squares in a row.
-constexpr double kMostSquares = 64;
+constexpr double kMaxSquares = 64;
 /// A map that lengthens the curve by more is made again with a sliding boundary.
 constexpr double kGoodLengthening = 1.007;
 /// So many parts that the map shrinks to nothing are slit open, one after the other.
-constexpr int kMostExtensions = 6;
+constexpr int kMaxExtensions = 6;
 /// Each of them must leave at most this share of the flipped faces.
 constexpr double kGoodProgress = .8;
 /// The general solver that mean values need is slow.
-constexpr std::size_t kMostFacesForMeanValues = 20'000;
+constexpr std::size_t kMaxFacesForMeanValues = 20'000;
 
 bool is_flipped(const Triangle& f, const std::vector<Vector2d>& places) {
   return orientation(places[f[0]], places[f[1]], places[f[2]]) <= 0;
@@ -35,7 +35,7 @@ int squares_for(const std::array<double, 4>& sides, double area) {
   const double length = .5 * (sides[0] + sides[2]), width = .5 * (sides[1] + sides[3]);
   // A boundary that is short against the area belongs to a blob, not to a strip.
   if (area > 2 * length * width) return 1;
-  return static_cast<int>(std::lround(std::clamp(length / width, 1., kMostSquares)));
+  return static_cast<int>(std::lround(std::clamp(length / width, 1., kMaxSquares)));
 }
 
 double area_of(const Disk& disk, const Triangle& face) {
@@ -93,7 +93,7 @@ void split_chords(Disk& disk, SquareBoundary& boundary) {
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s) {
       const TriangleSide side{f, s};
-      if (disk.neighbours()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
+      if (disk.neighbors()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
         continue;
       disk.split_edge(side);
       boundary.places.emplace_back(.5, .5);
@@ -118,9 +118,9 @@ struct Shear {
   double ratio = 1, lengthening = 1;
 };
 
-/// Means weighted by the area of the surface; no face counts for more than kMost.
+/// Means weighted by the area of the surface; no face counts for more than kMax.
 Shear mean_shear(const Disk& disk, const std::vector<Vector2d>& places) {
-  constexpr double kMost = 1e3;
+  constexpr double kMax = 1e3;
   Shear sum{0, 0};
   double area = 0;
   for (std::size_t f = 0; f < disk.faces().size(); ++f) {
@@ -129,7 +129,7 @@ Shear mean_shear(const Disk& disk, const std::vector<Vector2d>& places) {
     const double face_area = area_of(disk, face);
     if (!(face_area > 0)) continue;
     const auto [large, small] = squared_stretches(disk, face, places);
-    const double ratio = small * kMost * kMost > large ? std::sqrt(large / small) : kMost;
+    const double ratio = small * kMax * kMax > large ? std::sqrt(large / small) : kMax;
     sum.ratio += face_area * ratio;
     sum.lengthening += face_area * .5 * (std::sqrt(ratio) + 1 / std::sqrt(ratio));
     area += face_area;
@@ -179,7 +179,7 @@ struct MapTrial {
         !solve_symmetric(graph_, order_, boundary_.on_sides(kBottom | kTop), values.col(1)))
       return;
     const double width = modulus_of(values);
-    const int count = static_cast<int>(std::lround(std::clamp(std::max(width, 1 / width), 1., kMostSquares)));
+    const int count = static_cast<int>(std::lround(std::clamp(std::max(width, 1 / width), 1., kMaxSquares)));
     take(places_of(values, count, width < 1), count);
   }
 
@@ -251,8 +251,8 @@ std::optional<SquareMap> map_to_square(CutDisk& cut) {
     // Where places differ in their last digits only, the map has shrunk a part to nothing.
     const bool is_better = trial.flipped.size() < most_flipped;
     most_flipped = static_cast<std::size_t>(kGoodProgress * static_cast<double>(trial.flipped.size()));
-    if (is_better && extensions < kMostExtensions && extend_cut(cut, trial.flipped)) continue;
-    if (cut.disk.faces().size() <= kMostFacesForMeanValues) trial.use_mean_values();
+    if (is_better && extensions < kMaxExtensions && extend_cut(cut, trial.flipped)) continue;
+    if (cut.disk.faces().size() <= kMaxFacesForMeanValues) trial.use_mean_values();
     return trial.best;
   }
 }

@@ -9,7 +9,7 @@
 namespace hilbrush {
 
 struct Dot {
-  Eigen::Vector3d position_O;       ///< metres, on the surface
+  Eigen::Vector3d position_O;       ///< meters, on the surface
   Eigen::Vector3f normal_O;         ///< unit, of the dot's triangle
   Eigen::Vector3f smooth_normal_O;  ///< unit, interpolated between vertices over smooth edges; what "near the normal"
                                     ///< is measured against

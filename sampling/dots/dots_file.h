@@ -11,7 +11,7 @@
 /// point cloud.
 namespace hilbrush {
 
-/// A file of so many dots that is written as they come: element `vertex` with x y z (metres, frame O), nx ny nz, tone,
+/// A file of so many dots that is written as they come: element `vertex` with x y z (meters, frame O), nx ny nz, tone,
 /// level, component, reason; comments in the header give the name of each reason's code and the pitch.
 /// Memory: one block of rows.
 class DotsFile {

@@ -87,9 +87,9 @@ class DotsHeaderReader {
 
   std::string next_line() {
     std::string line;
-    constexpr std::size_t kLongest = 4096;
+    constexpr std::size_t kMax = 4096;
     for (char c = 0; in_.get(c) && c != '\n';) {
-      if (line.size() >= kLongest) refuse("has a header line without end");
+      if (line.size() >= kMax) refuse("has a header line without end");
       if (c != '\r') line += c;
     }
     if (!in_) refuse("ends within its header");

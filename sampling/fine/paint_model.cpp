@@ -28,8 +28,8 @@ constexpr float kBlurCutSigmas = 2.5f;
 constexpr std::size_t kDoseSteps = 4096;
 constexpr float kStepsAFullDose = 512;
 
-/// An even grey on all surface: for nodes of equal area.
-ToneField even_grey(const TexturedMesh& mesh) {
+/// An even gray on all surface: for nodes of equal area.
+ToneField even_gray(const TexturedMesh& mesh) {
   ToneOptions options;
   options.untextured = Untextured::kMaterial;
   // Luminance vanishes beside such reflectances, whatever the picture.
@@ -61,12 +61,12 @@ void PaintModel::tabulate(const SpotModel& spot) {
 }
 
 void PaintModel::lay_nodes(const SurfaceCurve& curve, const ToneField& tone) {
-  const ToneField grey = even_grey(curve.mesh());
+  const ToneField gray = even_gray(curve.mesh());
   SampleOptions options;
   options.dot_count =
       std::max<std::uint64_t>(1, std::llround(kNodesAPitch2 * curve.mesh().area_m2() / (pitch_m_ * pitch_m_)));
   options.dot_limit = std::numeric_limits<std::uint32_t>::max();
-  const DotSequence nodes = place_dots(curve, grey, options);
+  const DotSequence nodes = place_dots(curve, gray, options);
   const std::size_t count = nodes.dots.size();
   places_.resize(count), normals_.resize(count), wanted_.resize(count);
   dose_.assign(count, 0), pull_.assign(count, 0);

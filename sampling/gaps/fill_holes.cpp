@@ -22,21 +22,21 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kLeastGap = .5;
+constexpr double kMinGap = .5;
 /// Circles are filled from so much below the limit, so that the sweep, which calls no larger piece covered, finds
 /// little.
 constexpr double kMargin = .03;
-constexpr int kMostRounds = 3;
+constexpr int kMaxRounds = 3;
 /// Steps of the walk from a dot to the middle of a hole: each crosses a dozen triangles.
-constexpr int kMostWalks = 16;
+constexpr int kMaxWalks = 16;
 /// New dots are put next to dots within so many radii of their hole.
-constexpr double kNeighbourhood = 1.6;
+constexpr double kNeighborhood = 1.6;
 constexpr double kGridPitches = 2;
 /// Triangles are swept in so many blocks, whatever the number of threads.
 constexpr std::size_t kBlocks = 256;
 
-/// Centre of the circle through three points in space; none if they lie in line.
-std::optional<Vector3d> circle_centre(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+/// Center of the circle through three points in space; none if they lie in line.
+std::optional<Vector3d> circle_center(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
   const Vector3d u = b - a, v = c - a, n = u.cross(v);
   if (n.squaredNorm() <= 1e-12 * u.squaredNorm() * v.squaredNorm()) return {};
   return a + (u.squaredNorm() * v.cross(n) + v.squaredNorm() * n.cross(u)) / (2 * n.squaredNorm());
@@ -71,8 +71,8 @@ class HoleFilling {
   /// One Voronoi diagram for each square; returns how many dots it has brought.
   std::uint64_t fill_circles() {
     std::vector<GapMeter::Hole> holes;
-    for (std::uint32_t s = 0; s < curve_.sheets.size(); ++s) {
-      if (curve_.sheets[s].kind == SheetKind::kHilbertCube) continue;
+    for (std::uint32_t s = 0; s < curve_.charts.size(); ++s) {
+      if (curve_.charts[s].kind == ChartKind::kHilbertCube) continue;
       auto found = holes_on(s);
       holes.insert(holes.end(), found.begin(), found.end());
     }
@@ -109,23 +109,23 @@ class HoleFilling {
     const GapMeter::Hole hole = meter_.hole_at(point, slack_m);
     if (!(hole.size > 0)) return false;
     const Dot dot = make_dot(curve_, tone_, point, squares_.component(point.triangle));
-    const auto nearby = grid_.within(dot.position_O, dot.normal_O, kNeighbourhood * hole.radius_m);
+    const auto nearby = grid_.within(dot.position_O, dot.normal_O, kNeighborhood * hole.radius_m);
     dots_.push_back(dot);
     path_.insert_last(nearby);
     grid_.add(static_cast<std::uint32_t>(dots_.size() - 1));
     return true;
   }
 
-  std::vector<GapMeter::Hole> holes_on(std::uint32_t sheet) const {
+  std::vector<GapMeter::Hole> holes_on(std::uint32_t chart) const {
     std::vector<std::uint32_t> members;
     std::vector<Vector2d> places;
     for (std::uint32_t i = 0; i < dots_.size(); ++i) {
       const auto place = squares_.place(point_of(curve_.mesh, dots_[i]));
-      if (!place || place->sheet != sheet) continue;
+      if (!place || place->chart != chart) continue;
       members.push_back(i);
       places.push_back(place->place);
     }
-    const auto triples = voronoi_triples(places, curve_.sheets[sheet].square_count);
+    const auto triples = voronoi_triples(places, curve_.charts[chart].square_count);
     std::vector<GapMeter::Hole> holes(triples.size());
     tbb::parallel_for(std::size_t{0}, triples.size(), [&](std::size_t i) {
       holes[i] = hole_between(members[triples[i][0]], members[triples[i][1]], members[triples[i][2]]);
@@ -136,15 +136,15 @@ class HoleFilling {
 
   /// The hole in the middle of three dots, judged in space.
   GapMeter::Hole hole_between(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-    const auto centre = circle_centre(dots_[a].position_O, dots_[b].position_O, dots_[c].position_O);
-    if (!centre) return {};
-    const double radius = (*centre - dots_[a].position_O).norm();
+    const auto center = circle_center(dots_[a].position_O, dots_[b].position_O, dots_[c].position_O);
+    if (!center) return {};
+    const double radius = (*center - dots_[a].position_O).norm();
     if (radius < (1 - kMargin) * meter_.strictest_m()) return {};
     SurfacePoint point = point_of(curve_.mesh, dots_[std::min({a, b, c})]);
-    double distance = (position(curve_.mesh, point) - *centre).norm();
-    for (int walk = 0; walk < kMostWalks; ++walk) {
-      const SurfacePoint next = walk_towards(curve_.mesh, curve_.neighbours, point, *centre);
-      const double nearer = (position(curve_.mesh, next) - *centre).norm();
+    double distance = (position(curve_.mesh, point) - *center).norm();
+    for (int walk = 0; walk < kMaxWalks; ++walk) {
+      const SurfacePoint next = walk_towards(curve_.mesh, curve_.neighbors, point, *center);
+      const double nearer = (position(curve_.mesh, next) - *center).norm();
       if (!(nearer < distance)) break;
       point = next;
       distance = nearer;
@@ -165,15 +165,15 @@ class HoleFilling {
 
 DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots, double largest_gap_pitches,
                        FillReport* report, const Progress& progress) {
-  if (!(largest_gap_pitches >= kLeastGap))
+  if (!(largest_gap_pitches >= kMinGap))
     throw InputError("largest_gap", "must be at least .5 pitches: a gap that small asks for a dot everywhere");
   FillReport result;
   if (!dots.dots.empty()) {
     HoleFilling filling(curve.implementation(), tone, dots, largest_gap_pitches * dots.pitch_m);
-    for (std::uint64_t added = 1; added > 0 && result.voronoi_rounds < kMostRounds; ++result.voronoi_rounds) {
+    for (std::uint64_t added = 1; added > 0 && result.voronoi_rounds < kMaxRounds; ++result.voronoi_rounds) {
       added = filling.fill_circles();
       result.added += added;
-      if (progress) progress((result.voronoi_rounds + 1.) / (kMostRounds + 1));
+      if (progress) progress((result.voronoi_rounds + 1.) / (kMaxRounds + 1));
     }
     result.added_by_sweep = filling.sweep();
     result.added += result.added_by_sweep;

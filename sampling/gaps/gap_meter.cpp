@@ -38,7 +38,7 @@ double GapMeter::mean_tone(const SurfacePoint& point, double radius_m) const {
     // Vogel's sunflower: even over the disc.
     const double r = radius_m * std::sqrt((k + .5) / kLooks), turn = k * std::numbers::pi * (3 - std::sqrt(5.));
     const Vector3d target = middle + r * (std::cos(turn) * across + std::sin(turn) * along);
-    sum += tone_.asked(walk_towards(curve_.mesh, curve_.neighbours, point, target));
+    sum += tone_.asked(walk_towards(curve_.mesh, curve_.neighbors, point, target));
   }
   return sum / kLooks;
 }
@@ -58,11 +58,11 @@ GapMeter::Hole GapMeter::hole_at(const SurfacePoint& point, double slack_m) cons
   return hole;
 }
 
-GapMeter::Verdict GapMeter::judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& centre,
+GapMeter::Verdict GapMeter::judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& center,
                                   double radius_m) const {
   const double strictest = strictest_m();
-  const Vector3d place = position(curve_.mesh, centre);
-  const Eigen::Vector3f normal = face_normal(curve_.mesh, centre).cast<float>();
+  const Vector3d place = position(curve_.mesh, center);
+  const Eigen::Vector3f normal = face_normal(curve_.mesh, center).cast<float>();
   if (radius_m < strictest && grid_.nearest(place, normal, strictest - radius_m).dot != DotGrid::kNone)
     return Verdict::kCovered;
 

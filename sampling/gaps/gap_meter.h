@@ -9,7 +9,7 @@ namespace hilbrush {
 
 class GapMeter {
  public:
-  /// Keeps references. `limit_m` is the largest gap in metres at tone 1; `darkest` the largest asked tone.
+  /// Keeps references. `limit_m` is the largest gap in meters at tone 1; `darkest` the largest asked tone.
   GapMeter(const SurfaceCurve::Implementation& curve, const ToneField& tone, const DotGrid& grid, double limit_m,
            double darkest);
 
@@ -39,7 +39,7 @@ class GapMeter {
   /// Mean asked tone over the disc around a point.
   double mean_tone(const SurfacePoint& point, double radius_m) const;
   enum class Verdict { kCovered, kSuspect, kTooLarge };
-  Verdict judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& centre, double radius_m) const;
+  Verdict judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& center, double radius_m) const;
 
   const SurfaceCurve::Implementation& curve_;
   const ToneField& tone_;

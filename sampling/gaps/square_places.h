@@ -15,8 +15,8 @@ class SquarePlaces {
   std::uint32_t component(std::uint32_t triangle) const { return components_[triangle]; }
 
   struct Place {
-    std::uint32_t sheet = 0;
-    Eigen::Vector2d place;  ///< x up to the sheet's number of squares
+    std::uint32_t chart = 0;
+    Eigen::Vector2d place;  ///< x up to the chart's number of squares
   };
   /// None on a component that has no map.
   std::optional<Place> place(const SurfacePoint& point) const;
@@ -26,7 +26,7 @@ class SquarePlaces {
   std::vector<std::uint32_t> components_;
   /// Faces by triangle: faces_[first_[t]] .. faces_[first_[t + 1]].
   struct FaceIndex {
-    std::uint32_t sheet = 0, face = 0;
+    std::uint32_t chart = 0, face = 0;
   };
   std::vector<std::uint32_t> first_;
   std::vector<FaceIndex> faces_;

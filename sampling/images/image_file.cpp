@@ -17,7 +17,7 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr int kLargestSide = 1 << 16;
+constexpr int kMaxSide = 1 << 16;
 constexpr std::size_t kStripRows = 64;
 
 double srgb_to_linear(double encoded) {
@@ -57,7 +57,7 @@ std::string format_name(const path& file, std::string_view head) {
   return "";
 }
 
-/// libjpeg fills a truncated picture with grey and OpenImageIO calls that success; a whole one has an end marker after
+/// libjpeg fills a truncated picture with gray and OpenImageIO calls that success; a whole one has an end marker after
 /// its last scan.
 bool is_truncated_jpeg(std::string_view bytes) {
   using namespace std::string_view_literals;
@@ -123,14 +123,14 @@ std::size_t gif_pixels(std::string_view bytes) {
 /// What is wrong with the header, or empty.
 std::string header_fault(const OIIO::ImageSpec& spec, std::size_t pixel_limit) {
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1) return "it is not a flat picture";
-  if (spec.width > kLargestSide || spec.height > kLargestSide ||
+  if (spec.width > kMaxSide || spec.height > kMaxSide ||
       static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) > pixel_limit)
     return "it has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
            " pixels, more than the limit allows (" + std::to_string(pixel_limit) + " left)";
   const std::string color_space = lower_case(spec.get_string_attribute("jpeg:ColorSpace"));
   if (color_space == "cmyk" || color_space == "ycck" ||
       lower_case(spec.get_string_attribute("tiff:ColorSpace")) == "cmyk")
-    return "its colours are CMYK, which have no agreed meaning on screen; save it as RGB";
+    return "its colors are CMYK, which have no agreed meaning on screen; save it as RGB";
   if (spec.nchannels < 1 || spec.nchannels > 4)
     return "it has " + std::to_string(spec.nchannels) + " channels; 1 to 4 are read";
   return "";
@@ -180,7 +180,7 @@ template <class Value>
 bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, TextureFiller& filler) {
   // A tiled file is read by whole rows of tiles.
   const int step = spec.tile_height > 0 ? spec.tile_height : static_cast<int>(kStripRows);
-  if (step > kLargestSide || spec.tile_width > kLargestSide) return false;
+  if (step > kMaxSide || spec.tile_width > kMaxSide) return false;
   const auto channels = static_cast<std::size_t>(spec.nchannels);
   std::vector<Value> strip(static_cast<std::size_t>(std::min(step, spec.height)) *
                            static_cast<std::size_t>(spec.width) * channels);

@@ -22,9 +22,9 @@ using Eigen::Vector3d;
 /// Tone is looked up so many times a pitch along a contour.
 constexpr double kLooksPerPitch = 8;
 /// Rounds of the search for the pitch, and when it has ended.
-constexpr int kMostTrials = 8;
+constexpr int kMaxTrials = 8;
 constexpr double kCloseEnough = .002;
-constexpr double kMostSlices = 1e7;
+constexpr double kMaxSlices = 1e7;
 
 SurfacePoint point_on(const ContourPiece& piece, double share) {
   return {piece.triangle, (1 - share) * piece.from_b + share * piece.to_b};
@@ -69,7 +69,7 @@ double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
 double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, std::uint64_t count) {
   const double wanted = static_cast<double>(count);
   double pitch = std::sqrt(mass / wanted), best = pitch, best_error = 1e300;
-  for (int round = 0; round < kMostTrials && pitch > 0 && best_error > kCloseEnough; ++round) {
+  for (int round = 0; round < kMaxTrials && pitch > 0 && best_error > kCloseEnough; ++round) {
     const double found = toned_length(Slices(mesh, pitch), tone, pitch) / pitch;
     const double error = std::abs(found / wanted - 1);
     if (error < best_error) best_error = error, best = pitch;
@@ -163,10 +163,10 @@ double path_length(const std::vector<Dot>& dots) {
   return length;
 }
 
-std::vector<std::uint32_t> components_of(const TexturedMesh& mesh, const Neighbours& neighbours) {
+std::vector<std::uint32_t> components_of(const TexturedMesh& mesh, const Neighbors& neighbors) {
   std::vector<std::uint32_t> component_of(mesh.triangle_count(), 0);
   std::uint32_t number = 0;
-  for (const Component& component : find_components(mesh, neighbours)) {
+  for (const Component& component : find_components(mesh, neighbors)) {
     for (const std::uint32_t t : component.triangles) component_of[t] = number;
     ++number;
   }
@@ -193,7 +193,7 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   const double pitch = options.pitch_m ? *options.pitch_m : pitch_for(mesh, tone, mass, *options.dot_count);
   check_limit(options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch), options.dot_limit);
   const auto [low, high] = bounds(mesh);
-  if ((high.z() - low.z()) / pitch > kMostSlices) throw InputError("", "too many slices: lower the dpi or the size");
+  if ((high.z() - low.z()) / pitch > kMaxSlices) throw InputError("", "too many slices: lower the dpi or the size");
   sequence.pitch_m = pitch;
   const Slices slices(mesh, pitch);
   const double length = toned_length(slices, tone, pitch);
@@ -201,9 +201,9 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   if (count == 0) return sequence;
 
   SurfaceCurve::Implementation surroundings(mesh);
-  surroundings.neighbours = find_neighbours(mesh.triangles);
-  surroundings.dot_surfaces = find_dot_surfaces(mesh, surroundings.neighbours);
-  const std::vector<std::uint32_t> component_of = components_of(mesh, surroundings.neighbours);
+  surroundings.neighbors = find_neighbors(mesh.triangles);
+  surroundings.dot_surfaces = find_dot_surfaces(mesh, surroundings.neighbors);
+  const std::vector<std::uint32_t> component_of = components_of(mesh, surroundings.neighbors);
   SliceWalk walk(surroundings, component_of, tone, pitch, length / static_cast<double>(count));
   for (std::size_t k = 0; k < slices.count(); ++k) {
     walk.walk_slice(join(slices.pieces(k)));

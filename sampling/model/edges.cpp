@@ -35,17 +35,17 @@ EdgeTable edge_table(const std::vector<Triangle>& triangles) {
   return table;
 }
 
-Neighbours find_neighbours(const std::vector<Triangle>& triangles) {
-  Neighbours neighbours(triangles.size(), {kNoSide, kNoSide, kNoSide});
+Neighbors find_neighbors(const std::vector<Triangle>& triangles) {
+  Neighbors neighbors(triangles.size(), {kNoSide, kNoSide, kNoSide});
   const EdgeTable table = edge_table(triangles);
   for (const EdgeGroup& group : table.groups) {
     if (group.end - group.begin != 2) continue;
     const TriangleSide a = table.sides[group.begin], b = table.sides[group.begin + 1];
     if (a.triangle == b.triangle || triangles[a.triangle][a.side] == triangles[b.triangle][b.side]) continue;
-    neighbours[a.triangle][a.side] = b;
-    neighbours[b.triangle][b.side] = a;
+    neighbors[a.triangle][a.side] = b;
+    neighbors[b.triangle][b.side] = a;
   }
-  return neighbours;
+  return neighbors;
 }
 
 }  // namespace hilbrush

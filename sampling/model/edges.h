@@ -32,9 +32,9 @@ EdgeTable edge_table(const std::vector<Triangle>& triangles);
 /// Per triangle and side: the triangle side across it, or kNoSide.
 inline constexpr std::uint32_t kNoTriangle = ~std::uint32_t{0};
 inline constexpr TriangleSide kNoSide{kNoTriangle, 0};
-using Neighbours = std::vector<std::array<TriangleSide, 3>>;
+using Neighbors = std::vector<std::array<TriangleSide, 3>>;
 
-/// Two triangles are neighbours if they alone share an edge and pass it in opposite directions.
-Neighbours find_neighbours(const std::vector<Triangle>& triangles);
+/// Two triangles are neighbors if they alone share an edge and pass it in opposite directions.
+Neighbors find_neighbors(const std::vector<Triangle>& triangles);
 
 }  // namespace hilbrush

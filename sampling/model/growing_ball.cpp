@@ -15,8 +15,8 @@ double squared_distance(const Eigen::Vector3d& place, const Eigen::Vector3d& a, 
 
 }  // namespace
 
-GrowingBall::GrowingBall(const TexturedMesh& mesh, const Neighbours& neighbours)
-    : mesh_(mesh), neighbours_(neighbours), entered_(mesh.triangle_count()) {}
+GrowingBall::GrowingBall(const TexturedMesh& mesh, const Neighbors& neighbors)
+    : mesh_(mesh), neighbors_(neighbors), entered_(mesh.triangle_count()) {}
 
 void GrowingBall::begin(const Eigen::Vector3d& center_O, std::uint32_t triangle) {
   center_O_ = center_O;
@@ -31,7 +31,7 @@ void GrowingBall::begin(const Eigen::Vector3d& center_O, std::uint32_t triangle)
 void GrowingBall::enter(const Crossing& crossing) {
   entered_[crossing.triangle] = {crossing.radius2, round_};
   for (int side = 0; side < 3; ++side) {
-    const std::uint32_t next = neighbours_[crossing.triangle][static_cast<std::size_t>(side)].triangle;
+    const std::uint32_t next = neighbors_[crossing.triangle][static_cast<std::size_t>(side)].triangle;
     if (next == kNoTriangle || entered_[next].round == round_) continue;
     const double radius2 = squared_distance(center_O_, mesh_.corner(crossing.triangle, side),
                                             mesh_.corner(crossing.triangle, (side + 1) % 3));

@@ -13,11 +13,11 @@ namespace hilbrush {
 class GrowingBall {
  public:
   /// Keeps references.
-  GrowingBall(const TexturedMesh& mesh, const Neighbours& neighbours);
+  GrowingBall(const TexturedMesh& mesh, const Neighbors& neighbors);
 
   void begin(const Eigen::Vector3d& center_O, std::uint32_t triangle);
-  /// The square of the least radius at which the ball holds a way along the surface from its centre to the triangle:
-  /// over the ways, the least of how far from the centre the way crosses edges at most. Infinity if that is not less
+  /// The square of the least radius at which the ball holds a way along the surface from its center to the triangle:
+  /// over the ways, the least of how far from the center the way crosses edges at most. Infinity if that is not less
   /// than `within2`. Cost O(k log k) over all calls, k triangles meet the ball.
   double entry2(std::uint32_t triangle, double within2);
 
@@ -37,7 +37,7 @@ class GrowingBall {
   void enter(const Crossing& crossing);
 
   const TexturedMesh& mesh_;
-  const Neighbours& neighbours_;
+  const Neighbors& neighbors_;
   Eigen::Vector3d center_O_ = Eigen::Vector3d::Zero();
   std::uint32_t round_ = 0;
   std::vector<Entered> entered_;    ///< a triangle

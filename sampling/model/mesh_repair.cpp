@@ -151,7 +151,7 @@ bool run_alike(const std::vector<Triangle>& triangles, TriangleSide a, TriangleS
   return triangles[a.triangle][a.side] != triangles[b.triangle][b.side];
 }
 
-/// Parts of the surface that hang together over edges of two triangles: turned so that neighbours run alike, as most of
+/// Parts of the surface that hang together over edges of two triangles: turned so that neighbors run alike, as most of
 /// each part already did. Edges where that is impossible (a Moebius strip has one) are cut.
 class Orientation {
  public:
@@ -183,7 +183,7 @@ class Orientation {
 
   std::size_t cut_count() const { return cut_count_; }
   /// Who is joined to whom, by side, after everything.
-  Neighbours& partners() { return partners_; }
+  Neighbors& partners() { return partners_; }
   void turn_with_partners(std::uint32_t t) {
     turn_over(mesh_, t);  // sides 0, 1, 2 become 2, 1, 0
     std::swap(partners_[t][0], partners_[t][2]);
@@ -228,7 +228,7 @@ class Orientation {
   }
 
   TexturedMesh& mesh_;
-  Neighbours partners_;
+  Neighbors partners_;
   std::vector<std::uint32_t> to_turn_;
   std::size_t cut_count_ = 0;
 };
@@ -311,7 +311,7 @@ std::size_t turn_closed_parts_outwards(const TexturedMesh& mesh, Orientation& or
 }
 
 /// Gives every fan of triangles that hang together around a vertex a vertex of its own. Returns how many were added.
-std::size_t split_vertices(TexturedMesh& mesh, const Neighbours& partners) {
+std::size_t split_vertices(TexturedMesh& mesh, const Neighbors& partners) {
   std::vector<std::uint32_t> parent(3 * mesh.triangle_count());
   std::iota(parent.begin(), parent.end(), 0);
   const auto find = [&](std::uint32_t c) {
@@ -381,7 +381,7 @@ RepairedMesh repair_mesh(TexturedMesh mesh) {
   // A cut may end inside the surface, where both its sides still have the same vertices: from here on the triangles
   // alone say what hangs together.
   for (std::size_t added = split; added > 0; split += added)
-    added = split_vertices(mesh, find_neighbours(mesh.triangles));
+    added = split_vertices(mesh, find_neighbors(mesh.triangles));
   count("vertices split where parts only touch", split);
   renumber_along_surface(mesh);
   result.mesh = std::move(mesh);

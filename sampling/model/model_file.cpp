@@ -73,16 +73,16 @@ Model load_vrml(std::string text, const std::string& name, ModelFolder& folder, 
   return model;
 }
 
-/// A mesh format that says nothing of colour means no white object but any object: it is painted in the grey that
+/// A mesh format that says nothing of color means no white object but any object: it is painted in the gray that
 /// viewers show it in. (VRML does say: a shape without a material is white.)
-void paint_in_default_grey(Model& model, const std::string& name) {
-  constexpr double kGrey = .8;  // sRGB-encoded, as the default material of VRML has it
+void paint_in_default_gray(Model& model, const std::string& name) {
+  constexpr double kGray = .8;  // sRGB-encoded, as the default material of VRML has it
   const auto is_silent = [](const Material& material) { return material.source == ColorSource::kNone; };
   if (!std::ranges::all_of(model.mesh.materials, is_silent)) return;
   for (Material& material : model.mesh.materials) material.source = ColorSource::kMaterial;
-  const float luminance = luminance_of_srgb(kGrey, kGrey, kGrey);
+  const float luminance = luminance_of_srgb(kGray, kGray, kGray);
   for (auto& corners : model.mesh.corner_luminance) corners.fill(luminance);
-  model.warnings.push_back(name + ": the file says nothing of colour; the object is painted in a light grey");
+  model.warnings.push_back(name + ": the file says nothing of color; the object is painted in a light gray");
 }
 
 }  // namespace
@@ -112,7 +112,7 @@ Model load_model(const fs::path& file, const ImageReader& read_image, const Mode
       model = load_stl(std::move(text), name, limits);
       break;
   }
-  if (kind != Kind::kVrml) paint_in_default_grey(model, name);
+  if (kind != Kind::kVrml) paint_in_default_gray(model, name);
   model.files = folder.files();
   return model;
 }

@@ -31,7 +31,7 @@ enum class UpAxis { kY, kZ };
 
 struct Model {
   TexturedMesh mesh;                  ///< in the file's own units and axes
-  std::optional<double> unit_m;       ///< metres of one unit of the file, where the format says (VRML: 1)
+  std::optional<double> unit_m;       ///< meters of one unit of the file, where the format says (VRML: 1)
   UpAxis up = UpAxis::kZ;             ///< the format's habit: VRML and OBJ y, STL and PLY and OFF z
   std::vector<std::string> warnings;  ///< missing textures with the names tried, ignored nodes, dropped faces, ...
   std::vector<std::filesystem::path> files;  ///< everything that was read: the model, inlines, material files, images

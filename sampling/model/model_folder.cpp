@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLongestUrl = 1024;
+constexpr std::size_t kMaxUrl = 1024;
 constexpr std::size_t kSpellingLimit = 16;
 constexpr std::size_t kChunk = 1 << 18;
 
@@ -73,7 +73,7 @@ bool ModelFolder::contains(const fs::path& canonical) const {
 
 std::optional<fs::path> ModelFolder::find(const fs::path& base, const std::string& url, std::string& reason) const {
   reason = "there is no such file";
-  if (url.empty() || url.size() > kLongestUrl || has_control_bytes(url) || has_control_bytes(percent_decoded(url))) {
+  if (url.empty() || url.size() > kMaxUrl || has_control_bytes(url) || has_control_bytes(percent_decoded(url))) {
     reason = "that is no file name";
     return std::nullopt;
   }

@@ -8,15 +8,15 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kLargestSideM = 2;
+constexpr double kMaxSideM = 2;
 
-std::string millimetres(double length_m) {
+std::string millimeters(double length_m) {
   char text[40];
   std::snprintf(text, sizeof text, "%.6g mm", length_m * 1e3);
   return text;
 }
 
-/// Metres of one unit of the file.
+/// Meters of one unit of the file.
 double scale_of(const Model& model, const PlacementOptions& options, double longest_side) {
   if (options.size_m) {
     if (!std::isfinite(*options.size_m) || *options.size_m <= 0)
@@ -25,8 +25,8 @@ double scale_of(const Model& model, const PlacementOptions& options, double long
     // Saying both is fine as long as they agree.
     if (options.unit_m && std::abs(*options.unit_m / scale - 1) > 1e-6)
       throw InputError("", "--size-mm and --units-mm contradict each other: in units of " +
-                               millimetres(*options.unit_m) + " the longest side is " +
-                               millimetres(*options.unit_m * longest_side) + ", not " + millimetres(*options.size_m) +
+                               millimeters(*options.unit_m) + " the longest side is " +
+                               millimeters(*options.unit_m * longest_side) + ", not " + millimeters(*options.size_m) +
                                "; give one of them");
     return scale;
   }
@@ -52,11 +52,10 @@ TexturedMesh place_on_table(const Model& model, const PlacementOptions& options)
   if (!std::isfinite(longest_side) || longest_side <= 0) throw InputError("", "the model has no extent");
   const double scale = scale_of(model, options, longest_side);
   const double size_m = scale * longest_side;
-  if (!std::isfinite(size_m) || size_m > kLargestSideM)
-    throw InputError("", "the object would be " + millimetres(size_m) + " long, more than " +
-                             millimetres(kLargestSideM) +
+  if (!std::isfinite(size_m) || size_m > kMaxSideM)
+    throw InputError("", "the object would be " + millimeters(size_m) + " long, more than " + millimeters(kMaxSideM) +
                              "; give --size-mm (its longest side) or --units-mm (one unit of the file)");
-  if (size_m < 1e-6) throw InputError("", "the object would be only " + millimetres(size_m) + " long");
+  if (size_m < 1e-6) throw InputError("", "the object would be only " + millimeters(size_m) + " long");
   const Eigen::Vector3d foot((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, low.z());
   for (Eigen::Vector3d& p : mesh.vertices) p = scale * (p - foot);
   return mesh;

@@ -3,13 +3,13 @@
 
 #include "sampling/model/model_file.h"
 
-/// From the file's frame and units to the object frame O: metres, +z up, standing on z = 0, centred on the rotation
+/// From the file's frame and units to the object frame O: meters, +z up, standing on z = 0, centered on the rotation
 /// axis C.
 namespace hilbrush {
 
 struct PlacementOptions {
   std::optional<double> size_m = {};  ///< scale so that the longest side of the bounding box is this long
-  std::optional<double> unit_m = {};  ///< or: metres of one unit of the file
+  std::optional<double> unit_m = {};  ///< or: meters of one unit of the file
   std::optional<UpAxis> up = {};      ///< default: the format's habit
 };
 

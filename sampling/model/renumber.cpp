@@ -10,7 +10,7 @@
 namespace hilbrush {
 namespace {
 
-/// With vertices, colours and neighbours some two megabytes.
+/// With vertices, colors and neighbors some two megabytes.
 constexpr std::size_t kInCache = 8192;
 constexpr int kBits = 16;  ///< an axis: finer than any triangle of a large mesh
 constexpr std::uint32_t kUnnumbered = ~std::uint32_t{0};

@@ -6,26 +6,26 @@
 #include <string>
 #include <vector>
 
-/// The first noun of the pipeline: a triangle mesh whose surface points know their colour.
+/// The first noun of the pipeline: a triangle mesh whose surface points know their color.
 /// Plain data. Readers make it, place_on_table() moves it into the object frame O, repair_mesh() cleans it; nothing
 /// edits it later.
 namespace hilbrush {
 
-/// A picture as painting sees it. Row 0 is the bottom row: texel (i, j) has its centre at u = (i + .5)/width, v = (j +
+/// A picture as painting sees it. Row 0 is the bottom row: texel (i, j) has its center at u = (i + .5)/width, v = (j +
 /// .5)/height.
 struct Texture {
   int width = 0, height = 0;
-  int channels = 3;  ///< of the image: with 1 or 2 it multiplies the surface's colour, with 3 or 4 it replaces it
+  int channels = 3;  ///< of the image: with 1 or 2 it multiplies the surface's color, with 3 or 4 it replaces it
   std::vector<float> luminance;  ///< linear light, 0..1, width * height
   std::vector<float> opacity;    ///< 0..1, width * height, or empty: opaque
   std::string name;              ///< for messages
 };
 
-/// Where a triangle's colour comes from, weakest first.
+/// Where a triangle's color comes from, weakest first.
 enum class ColorSource {
   kNone,      ///< no material at all: white
-  kMaterial,  ///< a material's diffuse colour
-  kColors,    ///< colours per vertex or per face
+  kMaterial,  ///< a material's diffuse color
+  kColors,    ///< colors per vertex or per face
   kTexture    ///< an image (over, or times, the corner luminance: Texture::channels)
 };
 
@@ -41,12 +41,12 @@ struct Material {
 /// A corner is one of the three places where a triangle meets its vertices; uv and luminance are per corner, so seams
 /// need no split vertices.
 struct TexturedMesh {
-  std::vector<Eigen::Vector3d> vertices;                ///< #V; metres, frame O once placed
+  std::vector<Eigen::Vector3d> vertices;                ///< #V; meters, frame O once placed
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< #T; counter-clockwise seen from outside
   std::vector<std::array<Eigen::Vector2d, 3>>
       corner_uv;  ///< #T; zero where there is no texture; VRML's TextureTransform is applied
   std::vector<std::array<float, 3>>
-      corner_luminance;                       ///< #T; linear-light reflectance 0..1: material, face or vertex colour
+      corner_luminance;                       ///< #T; linear-light reflectance 0..1: material, face or vertex color
   std::vector<std::uint32_t> material_index;  ///< #T
   std::vector<Material> materials;
   std::vector<Texture> textures;

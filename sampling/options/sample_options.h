@@ -7,7 +7,7 @@ namespace hilbrush {
 
 /// How a dot is placed in its stratum (a stretch of the curve that holds the mass of one dot).
 enum class Sampler {
-  kCentroid,  ///< at the stratum's centre of mass, put back on the surface (default)
+  kCentroid,  ///< at the stratum's center of mass, put back on the surface (default)
   kJittered,  ///< at a random place along the stratum (the thesis, section 4.4)
   kEven,      ///< in the middle of the stratum along the curve
   kRandom,    ///< anywhere along the whole curve, sorted: the control
@@ -15,7 +15,7 @@ enum class Sampler {
   kHammersley,
   kSobol,
   kNiederreiter,
-  kBlue,  ///< in the stratum where neighbours push least: an isotropic blue-noise spectrum
+  kBlue,  ///< in the stratum where neighbors push least: an isotropic blue-noise spectrum
   kFine   ///< centroid, then moved for the picture that the paint will show (refine_dots)
 };
 

@@ -14,9 +14,9 @@ struct ToneCurve {
   double operator()(double coverage) const;
 };
 
-/// What to do with surface that has neither texture nor colours.
+/// What to do with surface that has neither texture nor colors.
 enum class Untextured {
-  kAuto,     ///< blank if any other part has texture or colours, else its material is painted
+  kAuto,     ///< blank if any other part has texture or colors, else its material is painted
   kBlank,    ///< never painted
   kMaterial  ///< its material is painted
 };

@@ -11,7 +11,7 @@ namespace hilbrush {
 /// When a quad is divided.
 struct DivisionRule {
   int minimum_depth = 0, maximum_depth = 0;
-  double largest_reach = 0;  ///< from a quad's centre to its corners and mid-sides, on the surface
+  double largest_reach = 0;  ///< from a quad's center to its corners and mid-sides, on the surface
 };
 
 /// A square of the parameter domain: column x and row y of side_count^2 equal ones.
@@ -21,7 +21,7 @@ struct Node {
   int depth = 0;
   Quad quad;
   bool has_grid = false;
-  std::array<Eigen::Vector3d, 9> grid;  ///< positions of corners, mid-sides and centre, row by row, if has_grid
+  std::array<Eigen::Vector3d, 9> grid;  ///< positions of corners, mid-sides and center, row by row, if has_grid
 
   double size() const { return 1 / static_cast<double>(side_count); }
   /// The place that has gone `right` and `up`, 0 to 1, of its size from its lower left corner.
@@ -29,7 +29,7 @@ struct Node {
     return Eigen::Vector2d(static_cast<double>(x) + right, static_cast<double>(y) + up) /
            static_cast<double>(side_count);
   }
-  Eigen::Vector2d centre_uv() const { return uv(.5, .5); }
+  Eigen::Vector2d center_uv() const { return uv(.5, .5); }
   /// The place of grid[k].
   Eigen::Vector2d grid_uv(unsigned k) const {
     const unsigned column = k % 3, row = k / 3;
@@ -82,7 +82,7 @@ class AdaptiveCurve {
 
  private:
   static constexpr unsigned kSide = Quad::kSide;
-  /// Positions at the corners, mid-sides and centres of all children.
+  /// Positions at the corners, mid-sides and centers of all children.
   static constexpr unsigned kFineSide = 2 * kSide + 1;
   using FineGrid = std::array<Eigen::Vector3d, kFineSide * kFineSide>;
 
@@ -108,7 +108,7 @@ class AdaptiveCurve {
     for (const Eigen::Vector3d& p : node.grid) reach2 = std::max(reach2, (p - node.grid[4]).squaredNorm());
     const double limit2 = rule_.largest_reach * rule_.largest_reach;
     return reach2 > limit2 ||
-           (!density_.is_constant() && reach2 * density_.at(node.centre_uv()) > limit2 * density_.mean());
+           (!density_.is_constant() && reach2 * density_.at(node.center_uv()) > limit2 * density_.mean());
   }
 
   FineGrid fine_grid(const NodeType& node) const {

@@ -24,7 +24,7 @@ double square_area(const ParametricSurface& surface, const Node<Quad>& leaf) {
 /// (c) By the first fundamental form at the vertex; (b) where that is singular.
 template <class Quad>
 double form_area(const ParametricSurface& surface, const Node<Quad>& leaf) {
-  const double element = surface.area_element(leaf.centre_uv());
+  const double element = surface.area_element(leaf.center_uv());
   return std::isfinite(element) ? element * leaf.size() * leaf.size() : square_area(surface, leaf);
 }
 
@@ -53,11 +53,11 @@ class AreaWalk {
         return walk_triangles(index, visit);
       case AreaMethod::kSquare:
         return curve_.walk(node, [&](const NodeType& leaf) {
-          visit(leaf, VertexArea{square_area(surface_, leaf), leaf.centre_uv()});
+          visit(leaf, VertexArea{square_area(surface_, leaf), leaf.center_uv()});
         });
       case AreaMethod::kFirstFundamentalForm:
         return curve_.walk(node, [&](const NodeType& leaf) {
-          visit(leaf, VertexArea{form_area(surface_, leaf), leaf.centre_uv()});
+          visit(leaf, VertexArea{form_area(surface_, leaf), leaf.center_uv()});
         });
     }
   }
@@ -68,7 +68,7 @@ class AreaWalk {
     Eigen::Vector3d position;
   };
 
-  Vertex vertex(const NodeType& leaf) const { return {leaf.centre_uv(), surface_.position(leaf.centre_uv())}; }
+  Vertex vertex(const NodeType& leaf) const { return {leaf.center_uv(), surface_.position(leaf.center_uv())}; }
 
   static VertexArea area_of(const Vertex& a, const Vertex& b, const Vertex& c) {
     return {triangle_area(a.position, b.position, c.position), (a.uv + b.uv + c.uv) / 3};

@@ -9,7 +9,7 @@ const std::vector<std::string>& parametric_shape_names() {
                                               "eight_surface",
                                               "whitney_umbrella",
                                               "super_ellipsoid",
-                                              "super_ellipsoid_reparameterised",
+                                              "super_ellipsoid_reparameterized",
                                               "equal_area_sphere"};
   return names;
 }

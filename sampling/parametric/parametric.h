@@ -30,7 +30,7 @@ class ParametricSurface {
   virtual ~ParametricSurface() = default;
 
   virtual Eigen::Vector3d position(const Eigen::Vector2d& uv) const = 0;
-  /// May be infinite where the parameterisation is singular.
+  /// May be infinite where the parameterization is singular.
   virtual Tangents tangents(const Eigen::Vector2d& uv) const = 0;
   virtual SecondDerivatives second_derivatives(const Eigen::Vector2d& uv) const = 0;
 
@@ -50,8 +50,8 @@ enum class ParametricShape {
   kEightSurface,                   ///< table 5.5
   kWhitneyUmbrella,                ///< table 5.5
   kSuperEllipsoid,                 ///< equations 4.2 to 4.4, all eight octants
-  kSuperEllipsoidReparameterised,  ///< the same surface after a power law in u and v (section 4.5)
-  kEqualAreaSphere                 ///< the sphere after the reparameterisation of equation 5.3
+  kSuperEllipsoidReparameterized,  ///< the same surface after a power law in u and v (section 4.5)
+  kEqualAreaSphere                 ///< the sphere after the reparameterization of equation 5.3
 };
 std::unique_ptr<ParametricSurface> make_surface(ParametricShape shape);
 
@@ -73,7 +73,7 @@ enum class AreaMethod {
 };
 
 /// Names for settings and reports: "plane", "sphere", "monkey_saddle", "eight_surface", "whitney_umbrella",
-/// "super_ellipsoid", "super_ellipsoid_reparameterised", "equal_area_sphere"; "constant", "u", "u+v", "mean_curvature",
+/// "super_ellipsoid", "super_ellipsoid_reparameterized", "equal_area_sphere"; "constant", "u", "u+v", "mean_curvature",
 /// "gaussian_curvature"; "triangle", "square", "first_fundamental_form". Indexed by the enumerators.
 const std::vector<std::string>& parametric_shape_names();
 const std::vector<std::string>& parametric_density_names();
@@ -109,7 +109,7 @@ struct ParametricSamples {
 };
 
 /// Spreads dots by the adaptive curve (figures 4.1 and 4.6): a quad is divided while its depth is below the minimum, or
-/// while it is below the maximum and one of its corners or mid-sides is further from its centre than half the spacing
+/// while it is below the maximum and one of its corners or mid-sides is further from its center than half the spacing
 /// of omega * dot_count vertices, in space and - where the density is above its mean - by density. Leaves are not
 /// stored but walked twice, in parallel: to measure, then to place. Same options, same bytes.
 /// @throws InputError for a sampler, curve, depth or count that it can't do, or a density that is zero everywhere.

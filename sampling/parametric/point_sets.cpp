@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 31;
+constexpr std::uint64_t kMaxPoints = std::uint64_t{1} << 31;
 /// "To avoid the leading zeros phenomenon" (section 5.1.3).
 constexpr std::uint32_t kDroppedPoints = 100;
 
@@ -86,7 +86,7 @@ const std::vector<std::string>& plane_set_names() {
 }
 
 std::vector<Vector2d> plane_set(PlaneSet set, std::uint64_t count, std::uint64_t seed) {
-  if (count > kMostPoints) throw InputError("count", "is above " + std::to_string(kMostPoints));
+  if (count > kMaxPoints) throw InputError("count", "is above " + std::to_string(kMaxPoints));
   switch (set) {
     case PlaneSet::kRandom:
       return one_by_one(count, [&](std::uint64_t k) {

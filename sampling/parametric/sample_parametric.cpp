@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr std::uint64_t kMostDots = 100'000'000;
+constexpr std::uint64_t kMaxDots = 100'000'000;
 
 /// Depths that suit a curve.
 template <class Quad>
@@ -92,7 +92,7 @@ class Sampling {
 
   std::vector<Vector2d> vertices() {
     std::vector<Vector2d> all;
-    for (NodeOf node : nodes_) curve_.walk(node, [&](const NodeOf& leaf) { all.push_back(leaf.centre_uv()); });
+    for (NodeOf node : nodes_) curve_.walk(node, [&](const NodeOf& leaf) { all.push_back(leaf.center_uv()); });
     return all;
   }
 
@@ -150,7 +150,7 @@ class Sampling {
   }
 
   Vector2d place_in(const NodeOf& leaf, double share) const {
-    if (options_.snaps_to_vertices) return leaf.centre_uv();
+    if (options_.snaps_to_vertices) return leaf.center_uv();
     const Vector2d place = curve_place(leaf.quad, share);
     return leaf.uv(place.x(), place.y());
   }
@@ -193,7 +193,7 @@ class Sampling {
     Vector2d moment_uv = Vector2d::Zero();
   };
 
-  /// Strata of equal mass; a dot at each one's centre of mass in the parameter domain.
+  /// Strata of equal mass; a dot at each one's center of mass in the parameter domain.
   void place_centroids(std::vector<ParametricDot>& dots) const {
     std::vector<std::vector<StratumShare>> shares(nodes_.size());
     tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) { shares[n] = cut_strata(n, dots.size()); });
@@ -257,7 +257,7 @@ void check_options(const ParametricOptions& options) {
   if (options.curve == CurveKind::kLaminar) throw InputError("curve", "laminar slices need a mesh");
   if (options.snaps_to_vertices && options.sampler == Sampler::kCentroid)
     throw InputError("snaps_to_vertices", "would undo centroid");
-  if (options.dot_count > kMostDots) throw InputError("dot_count", "is above " + std::to_string(kMostDots));
+  if (options.dot_count > kMaxDots) throw InputError("dot_count", "is above " + std::to_string(kMaxDots));
 }
 
 /// Calls `use` with the sampling of the curve that was asked for.

@@ -161,7 +161,7 @@ std::unique_ptr<ParametricSurface> make_surface(ParametricShape shape) {
       return std::make_unique<ProductSurface<WhitneyUmbrella>>();
     case ParametricShape::kSuperEllipsoid:
       return std::make_unique<ProductSurface<SuperEllipsoidOf<plain_roots>>>();
-    case ParametricShape::kSuperEllipsoidReparameterised:
+    case ParametricShape::kSuperEllipsoidReparameterized:
       return std::make_unique<ProductSurface<SuperEllipsoidOf<smooth_roots>>>();
     case ParametricShape::kEqualAreaSphere:
       return std::make_unique<ProductSurface<EqualAreaSphere>>();

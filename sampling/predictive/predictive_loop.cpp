@@ -18,11 +18,11 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kTexelPitches = .5;   ///< between texels of what is asked
-constexpr double kErrorPitches = 1;    ///< between places where the error is read: it is smooth over a pitch
-constexpr double kMostCorrection = 1;  ///< of a wanted tone, in either direction
+constexpr double kTexelPitches = .5;  ///< between texels of what is asked
+constexpr double kErrorPitches = 1;   ///< between places where the error is read: it is smooth over a pitch
+constexpr double kMaxCorrection = 1;  ///< of a wanted tone, in either direction
 /// The atlas repeats the mass of each triangle; beyond this it would only amplify rounding.
-constexpr double kMostRescaling = 2;
+constexpr double kMaxRescaling = 2;
 
 /// Visits the nodes of a triangle's rectangle whose box, `reach` steps to each side, meets the triangle.
 template <class Visit>
@@ -65,7 +65,7 @@ class Correction {
       const double error = static_cast<double>(painted[i]) - wanted[i];
       square += error * error;
       float& value = values_[texels_[i]];
-      value = static_cast<float>(std::clamp(value - share * error, -kMostCorrection, kMostCorrection));
+      value = static_cast<float>(std::clamp(value - share * error, -kMaxCorrection, kMaxCorrection));
     }
     return points_.empty() ? 0 : std::sqrt(square / static_cast<double>(points_.size()));
   }
@@ -145,7 +145,7 @@ class AskedTexels {
       const std::array<Vector2d, 3> whole{Vector2d(0, 0), Vector2d(1, 0), Vector2d(0, 1)};
       const double mass = asked_.integrate(t, whole).mass, own = baked.integrate(t, whole).mass;
       if (!(own > 0)) return;
-      const double scale = std::clamp(mass / own, 1 / kMostRescaling, kMostRescaling);
+      const double scale = std::clamp(mass / own, 1 / kMaxRescaling, kMaxRescaling);
       visit_nodes(layout_, t, 1, [&](const TriangleFrame&, std::size_t texel, const Vector2d&, const BoxedPolygon&) {
         texels_[texel] = static_cast<float>(texels_[texel] * scale);
       });
@@ -173,12 +173,12 @@ class AskedTexels {
 /// blank.
 std::optional<SurfacePoint> point_with_tone(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
                                             Vector2d low, Vector2d high) {
-  constexpr int kMostSteps = 40;
+  constexpr int kMaxSteps = 40;
   ToneIntegral integral = asked.integrate(triangle, frame.clip_box(low, high).corners());
-  for (int halving = 0; halving < kMostSteps && integral.mass > 0; ++halving) {
+  for (int halving = 0; halving < kMaxSteps && integral.mass > 0; ++halving) {
     const Vector2d b = integral.first / integral.mass;
-    const SurfacePoint centre{triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
-    if (asked.asked(centre) > 0) return centre;
+    const SurfacePoint center{triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
+    if (asked.asked(center) > 0) return center;
     const int axis = halving % 2;
     const double middle = .5 * (low[axis] + high[axis]);
     Vector2d lower_high = high, upper_low = low;

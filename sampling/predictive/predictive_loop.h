@@ -10,7 +10,7 @@
 
 /// Places dots, predicts the picture they will make, and asks again where it is too light or too dark.
 ///
-/// A tone curve knows flat grey; a picture also has edges, thin lines, grain and curved surface. The loop sees what
+/// A tone curve knows flat gray; a picture also has edges, thin lines, grain and curved surface. The loop sees what
 /// they do to the tone and takes a share of the error off the wanted tone. What is asked for in the end is no function
 /// of the texture any more (texture coordinates overlap: one texel may be many places), so it is kept in an atlas of
 /// the triangles (tone/asked_atlas.h), on which the curve integrates as exactly as on a texture. Blank surface stays

@@ -15,8 +15,8 @@ std::vector<Eigen::Vector3d> places_of(std::span<const Dot> dots) {
 
 }  // namespace
 
-DotsOnSurface::DotsOnSurface(const TexturedMesh& mesh, const Neighbours& neighbours, std::span<const Dot> dots)
-    : tree_(places_of(dots)), triangles_(dots.size()), balls_([&] { return GrowingBall(mesh, neighbours); }) {
+DotsOnSurface::DotsOnSurface(const TexturedMesh& mesh, const Neighbors& neighbors, std::span<const Dot> dots)
+    : tree_(places_of(dots)), triangles_(dots.size()), balls_([&] { return GrowingBall(mesh, neighbors); }) {
   std::transform(dots.begin(), dots.end(), triangles_.begin(), [](const Dot& dot) { return dot.triangle; });
 }
 

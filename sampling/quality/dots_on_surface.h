@@ -19,8 +19,8 @@ namespace hilbrush {
 /// straight distance, no more than the way along the surface; it rises no faster than the place moves.
 class DotsOnSurface {
  public:
-  /// Keeps references to mesh and neighbours. Cost O(n log n).
-  DotsOnSurface(const TexturedMesh& mesh, const Neighbours& neighbours, std::span<const Dot> dots);
+  /// Keeps references to mesh and neighbors. Cost O(n log n).
+  DotsOnSurface(const TexturedMesh& mesh, const Neighbors& neighbors, std::span<const Dot> dots);
 
   static constexpr std::uint32_t kNone = PointTree<3>::kNone;
 

@@ -65,10 +65,10 @@ class PointTree {
     return best;
   }
 
-  /// Calls visit(index, place) for each point within `radius` of `centre`, in the order of the tree.
+  /// Calls visit(index, place) for each point within `radius` of `center`, in the order of the tree.
   template <class Visit>
-  void visit_near(const Point& centre, double radius, Visit&& visit) const {
-    if (!entries_.empty()) visit_below(centre, radius * radius, visit, 0, 0, entries_.size());
+  void visit_near(const Point& center, double radius, Visit&& visit) const {
+    if (!entries_.empty()) visit_below(center, radius * radius, visit, 0, 0, entries_.size());
   }
 
  private:
@@ -152,36 +152,36 @@ class PointTree {
   }
 
   template <class Visit>
-  void visit_below(const Point& centre, double radius2, Visit& visit, std::size_t node, std::size_t begin,
+  void visit_below(const Point& center, double radius2, Visit& visit, std::size_t node, std::size_t begin,
                    std::size_t end) const {
-    if (begin == end || boxes_[node].squaredExteriorDistance(centre) > radius2) return;
+    if (begin == end || boxes_[node].squaredExteriorDistance(center) > radius2) return;
     if (is_leaf(node)) {
       for (std::size_t i = begin; i < end; ++i)
-        if ((entries_[i].place - centre).squaredNorm() <= radius2) visit(entries_[i].index, entries_[i].place);
+        if ((entries_[i].place - center).squaredNorm() <= radius2) visit(entries_[i].index, entries_[i].place);
       return;
     }
     const std::size_t middle = begin + (end - begin) / 2;
-    visit_below(centre, radius2, visit, 2 * node + 1, begin, middle);
-    visit_below(centre, radius2, visit, 2 * node + 2, middle, end);
+    visit_below(center, radius2, visit, 2 * node + 1, begin, middle);
+    visit_below(center, radius2, visit, 2 * node + 2, middle, end);
   }
 
   std::vector<Entry> entries_;
   std::vector<Box> boxes_;  ///< a heap: the children of node n are 2n + 1 and 2n + 2
 };
 
-/// Within a distance of a centre.
+/// Within a distance of a center.
 template <int kDimension>
 struct Ball {
   using Point = Eigen::Matrix<double, kDimension, 1>;
-  Point centre;
+  Point center;
   double radius = 0;
 
   Overlap overlap(const Eigen::AlignedBox<double, kDimension>& box) const {
-    if (box.squaredExteriorDistance(centre) >= radius * radius) return Overlap::kOutside;
-    const Point far = (centre - box.min()).cwiseMax(box.max() - centre);
+    if (box.squaredExteriorDistance(center) >= radius * radius) return Overlap::kOutside;
+    const Point far = (center - box.min()).cwiseMax(box.max() - center);
     return far.squaredNorm() < radius * radius ? Overlap::kInside : Overlap::kPartly;
   }
-  bool contains(const Point& p) const { return (p - centre).squaredNorm() < radius * radius; }
+  bool contains(const Point& p) const { return (p - center).squaredNorm() < radius * radius; }
 };
 
 /// What lies on the inner side of some lines or planes: normal . p > offset for all of them.

@@ -46,7 +46,7 @@ Discrepancy sphere_discrepancy(std::span<const Eigen::Vector3d> directions, cons
 /// that are not positive are left out; 0 if fewer than two are left.
 double log_log_slope(std::span<const double> counts, std::span<const double> values);
 
-/// Distances to the nearest neighbour, over that of the densest packing, sqrt(2 A / (sqrt(3) N)).
+/// Distances to the nearest neighbor, over that of the densest packing, sqrt(2 A / (sqrt(3) N)).
 struct Spacing {
   double smallest = 0, mean = 0;
   double spread = 0;              ///< standard deviation over mean
@@ -56,7 +56,7 @@ Spacing plane_spacing(std::span<const Eigen::Vector2d> points);
 /// On the unit sphere, along chords.
 Spacing sphere_spacing(std::span<const Eigen::Vector3d> directions);
 
-/// Radius of the largest empty disc with its centre in the square (on the sphere), over sqrt(A / N); exact to 1e-3 of
+/// Radius of the largest empty disc with its center in the square (on the sphere), over sqrt(A / N); exact to 1e-3 of
 /// itself, by branch and bound.
 double plane_largest_hole(std::span<const Eigen::Vector2d> points);
 double sphere_largest_hole(std::span<const Eigen::Vector3d> directions);
@@ -118,11 +118,11 @@ class SurfaceQuality {
   /// of equal area, whose tone is integrated exactly.
   std::vector<Discrepancy> balls(std::span<const std::span<const Dot>> sets, const TestShapes& shapes = {}) const;
   /// Expected share of dots within a ball.
-  double share_in_ball(const Eigen::Vector3d& centre_O, double radius_m) const;
+  double share_in_ball(const Eigen::Vector3d& center_O, double radius_m) const;
 
-  /// Neighbours and holes lie on the surface: a dot is as far as the radius at which a ball around the place holds a
+  /// Neighbors and holes lie on the surface: a dot is as far as the radius at which a ball around the place holds a
   /// way along the surface to it. That is the straight distance, over folds and bumps too, but to the far side of a
-  /// thin wall it is that around the rim. An empty disc is what of such a ball hangs together with its centre.
+  /// thin wall it is that around the rim. An empty disc is what of such a ball hangs together with its center.
   Spacing spacing(std::span<const Dot> dots) const;
   /// Radius of the largest empty disc. Exact to 1e-3 of itself by branch and bound where the tone is constant; under a
   /// texture to 1/8 of a pitch.
@@ -131,7 +131,7 @@ class SurfaceQuality {
   double path_constant(std::span<const Dot> dots) const;
 
   /// Mean over patches around random surface points, about 20 pitches across, each flattened onto the tangent plane at
-  /// its centre along chords and faded out towards its rim by (1 - r^2/R^2)^2. The even density of the same patch is
+  /// its center along chords and faded out towards its rim by (1 - r^2/R^2)^2. The even density of the same patch is
   /// transformed along with the dots and taken off, so that neither its curvature nor its rim nor its tone counts as
   /// power. Frequencies are resolved to about 1/16 of the principal one. Patches that bend by more than 60 degrees are
   /// left out. @throws InputError if none is left or there are fewer than 100 dots.

@@ -13,8 +13,8 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kPointsAtOnce = 60000;
-constexpr std::size_t kMostRings = 80;
-constexpr std::size_t kMostDirections = 36;
+constexpr std::size_t kMaxRings = 80;
+constexpr std::size_t kMaxDirections = 36;
 
 /// The spectrum of one square; `expected` points in it.
 Spectrum spectrum_of_square(std::span<const Vector2d> points, double expected) {
@@ -22,8 +22,8 @@ Spectrum spectrum_of_square(std::span<const Vector2d> points, double expected) {
   const int highest = std::max(1, static_cast<int>(SpectrumSums::kHighest * principal));
   const PointTransform transform(points, highest);
   // A ring holds at least one frequency in its width, a sector a few hundred.
-  SpectrumSums sums(std::clamp<std::size_t>(static_cast<std::size_t>(highest), 1, kMostRings),
-                    std::clamp<std::size_t>(static_cast<std::size_t>(expected / 400), 4, kMostDirections));
+  SpectrumSums sums(std::clamp<std::size_t>(static_cast<std::size_t>(highest), 1, kMaxRings),
+                    std::clamp<std::size_t>(static_cast<std::size_t>(expected / 400), 4, kMaxDirections));
   for (int kx = 0; kx <= highest; ++kx)
     for (int ky = -highest; ky <= highest; ++ky) {
       if (kx == 0 && ky <= 0) continue;  // the other half of the plane mirrors this one

@@ -125,9 +125,9 @@ std::vector<Discrepancy> SurfaceQuality::balls(Sets sets, const TestShapes& shap
   std::vector<double> shares(shapes.count);
   tbb::parallel_for(std::size_t{0}, shapes.count, [&](std::size_t i) {
     const ShapeNumbers number(shapes, 7, i);
-    const SurfacePoint centre = surface.random_point(number(0), number(1), number(2));
-    balls[i] = {position(surface.mesh, centre), (1 - number(3)) * surface.diagonal_m / 2};
-    shares[i] = share_in_ball(balls[i].centre, balls[i].radius);
+    const SurfacePoint center = surface.random_point(number(0), number(1), number(2));
+    balls[i] = {position(surface.mesh, center), (1 - number(3)) * surface.diagonal_m / 2};
+    shares[i] = share_in_ball(balls[i].center, balls[i].radius);
   });
   std::vector<Discrepancy> result;
   for (const std::span<const Dot> dots : sets) {

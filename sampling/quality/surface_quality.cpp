@@ -98,11 +98,7 @@ double disc_triangle_area(double radius, const Vector2d& a, const Vector2d& b, c
 }
 
 SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const ToneField* t)
-    : mesh(m),
-      tone(t),
-      masses(measure_masses(m, t, is_even)),
-      neighbours(find_neighbours(m.triangles)),
-      tree(m, masses) {
+    : mesh(m), tone(t), masses(measure_masses(m, t, is_even)), neighbors(find_neighbors(m.triangles)), tree(m, masses) {
   mass_sums.resize(masses.size());
   std::partial_sum(masses.begin(), masses.end(), mass_sums.begin());
   mass = mass_sums.empty() ? 0 : mass_sums.back();
@@ -111,15 +107,15 @@ SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const Tone
   diagonal_m = (box[1] - box[0]).norm();
 }
 
-double SurfaceQuality::Implementation::mass_in_ball(std::uint32_t triangle, const Vector3d& centre,
+double SurfaceQuality::Implementation::mass_in_ball(std::uint32_t triangle, const Vector3d& center,
                                                     double radius) const {
   const Vector3d normal = mesh.area_vector(triangle).normalized();
-  const double height = normal.dot(centre - mesh.corner(triangle, 0));
+  const double height = normal.dot(center - mesh.corner(triangle, 0));
   if (std::abs(height) >= radius || !(masses[triangle] > 0)) return 0;
   const double disc_radius = std::sqrt(radius * radius - height * height);
   const Flat flat(mesh, triangle);
   std::array<Vector2d, 3> corners;
-  for (int c = 0; c < 3; ++c) corners[static_cast<std::size_t>(c)] = flat(mesh.corner(triangle, c) - centre);
+  for (int c = 0; c < 3; ++c) corners[static_cast<std::size_t>(c)] = flat(mesh.corner(triangle, c) - center);
   if (is_even[triangle]) {
     const double share =
         disc_triangle_area(disc_radius, corners[0], corners[1], corners[2]) / mesh.area_vector(triangle).norm();
@@ -164,16 +160,16 @@ SurfacePoint SurfaceQuality::nearest(const Vector3d& position_O) const {
   return implementation_->tree.nearest(position_O);
 }
 
-double SurfaceQuality::share_in_ball(const Vector3d& centre_O, double radius_m) const {
+double SurfaceQuality::share_in_ball(const Vector3d& center_O, double radius_m) const {
   const Implementation& surface = *implementation_;
-  return surface.tree.mass_within(centre_O, radius_m, [&](std::uint32_t t) {
-    return surface.mass_in_ball(t, centre_O, radius_m);
+  return surface.tree.mass_within(center_O, radius_m, [&](std::uint32_t t) {
+    return surface.mass_in_ball(t, center_O, radius_m);
   }) / surface.mass;
 }
 
 Spacing SurfaceQuality::spacing(std::span<const Dot> dots) const {
   const Implementation& surface = *implementation_;
-  const DotsOnSurface on_surface(surface.mesh, surface.neighbours, dots);
+  const DotsOnSurface on_surface(surface.mesh, surface.neighbors, dots);
   const double densest =
       densest_packing_distance(surface.mass / static_cast<double>(std::max<std::size_t>(dots.size(), 1)));
   std::vector<double> distances(dots.size());
@@ -189,7 +185,7 @@ Spacing SurfaceQuality::spacing(std::span<const Dot> dots) const {
 double SurfaceQuality::largest_hole(std::span<const Dot> dots) const {
   CHECK(!dots.empty());
   const Implementation& surface = *implementation_;
-  const DotsOnSurface on_surface(surface.mesh, surface.neighbours, dots);
+  const DotsOnSurface on_surface(surface.mesh, surface.neighbors, dots);
   const double pitch = std::sqrt(surface.mass / static_cast<double>(dots.size()));
   std::vector<SearchTriangle> triangles;
   for (std::uint32_t t = 0; t < surface.mesh.triangle_count(); ++t)

@@ -19,11 +19,11 @@ struct SurfaceQuality::Implementation {
   std::vector<double> mass_sums;      ///< of the triangles up to this one
   double mass = 0;
   double diagonal_m = 0;  ///< of the bounding box
-  Neighbours neighbours;
+  Neighbors neighbors;
   TriangleTree tree;
 
   /// Mass of what lies of a triangle within a ball.
-  double mass_in_ball(std::uint32_t triangle, const Eigen::Vector3d& centre, double radius) const;
+  double mass_in_ball(std::uint32_t triangle, const Eigen::Vector3d& center, double radius) const;
   /// A surface point, random by mass, from three numbers of [0, 1).
   SurfacePoint random_point(double which, double u, double v) const;
   /// Asked density, 1 where tone doesn't matter.

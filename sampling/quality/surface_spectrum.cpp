@@ -21,11 +21,11 @@ namespace {
 using Eigen::Vector2d, Eigen::Vector3d;
 
 constexpr double kRadius = 10;  ///< of a patch, in pitches
-constexpr std::size_t kMostPatches = 256;
+constexpr std::size_t kMaxPatches = 256;
 constexpr std::size_t kRings = 32;
 constexpr std::size_t kDirections = 8;  ///< over half a turn
-constexpr double kLeastCosine = .5;     ///< of the bend within a patch
-constexpr std::size_t kLeastDots = 100;
+constexpr double kMinCosine = .5;       ///< of the bend within a patch
+constexpr std::size_t kMinDots = 100;
 
 struct Weighted {
   Vector2d place;  ///< on the tangent plane, in pitches
@@ -48,23 +48,23 @@ double window(double distance_pitches) {
 /// The tangent plane around a surface point; lengths along chords, so that what bends keeps its extent.
 class TangentPlane {
  public:
-  TangentPlane(const Vector3d& centre, const Vector3d& normal, double turn, double pitch)
-      : centre_(centre), normal_(normal), pitch_(pitch) {
+  TangentPlane(const Vector3d& center, const Vector3d& normal, double turn, double pitch)
+      : center_(center), normal_(normal), pitch_(pitch) {
     const Vector3d any = normal.unitOrthogonal();
     x_ = std::cos(turn) * any + std::sin(turn) * normal.cross(any);
     y_ = normal.cross(x_);
   }
   Vector2d operator()(const Vector3d& place) const {
-    const Vector3d offset = (place - centre_) / pitch_;
+    const Vector3d offset = (place - center_) / pitch_;
     const Vector2d flat(offset.dot(x_), offset.dot(y_));
     const double length = flat.norm();
     return length > 0 ? Vector2d(flat * (offset.norm() / length)) : flat;
   }
-  const Vector3d& centre() const { return centre_; }
+  const Vector3d& center() const { return center_; }
   const Vector3d& normal() const { return normal_; }
 
  private:
-  Vector3d centre_, normal_, x_, y_;
+  Vector3d center_, normal_, x_, y_;
   double pitch_;
 };
 
@@ -76,11 +76,11 @@ class PatchMaker {
         tree_(tree),
         pitch_(std::sqrt(surface.mass / static_cast<double>(dots.size()))) {}
 
-  FlatPatch make(const SurfacePoint& centre, double turn) const {
-    const double pitch = pitch_ / std::sqrt(std::max(surface_.density(centre), 1e-6));
-    const TangentPlane plane(position(surface_.mesh, centre), face_normal(surface_.mesh, centre), turn, pitch);
+  FlatPatch make(const SurfacePoint& center, double turn) const {
+    const double pitch = pitch_ / std::sqrt(std::max(surface_.density(center), 1e-6));
+    const TangentPlane plane(position(surface_.mesh, center), face_normal(surface_.mesh, center), turn, pitch);
     FlatPatch patch;
-    const std::unordered_set<std::uint32_t> triangles = connected_triangles(centre.triangle, plane, pitch, patch);
+    const std::unordered_set<std::uint32_t> triangles = connected_triangles(center.triangle, plane, pitch, patch);
     if (!patch.is_flat_enough) return patch;
     std::vector<std::uint32_t> ordered(triangles.begin(), triangles.end());
     std::sort(ordered.begin(), ordered.end());
@@ -88,7 +88,7 @@ class PatchMaker {
       add_even(t, {surface_.mesh.corner(t, 0), surface_.mesh.corner(t, 1), surface_.mesh.corner(t, 2)}, plane, pitch,
                patch);
     std::vector<std::uint32_t> inside;
-    tree_.visit_near(plane.centre(), kRadius * pitch, [&](std::uint32_t i, const Vector3d&) {
+    tree_.visit_near(plane.center(), kRadius * pitch, [&](std::uint32_t i, const Vector3d&) {
       if (triangles.contains(dots_[i].triangle)) inside.push_back(i);
     });
     std::sort(inside.begin(), inside.end());
@@ -100,7 +100,7 @@ class PatchMaker {
   }
 
  private:
-  /// Those that the ball touches and that hang together with the centre's.
+  /// Those that the ball touches and that hang together with the center's.
   std::unordered_set<std::uint32_t> connected_triangles(std::uint32_t start, const TangentPlane& plane, double pitch,
                                                         FlatPatch& patch) const {
     std::unordered_set<std::uint32_t> found{start};
@@ -108,13 +108,13 @@ class PatchMaker {
     while (!open.empty()) {
       const std::uint32_t t = open.back();
       open.pop_back();
-      if (surface_.mesh.area_vector(t).normalized().dot(plane.normal()) < kLeastCosine) patch.is_flat_enough = false;
-      for (const TriangleSide& side : surface_.neighbours[t]) {
+      if (surface_.mesh.area_vector(t).normalized().dot(plane.normal()) < kMinCosine) patch.is_flat_enough = false;
+      for (const TriangleSide& side : surface_.neighbors[t]) {
         if (side == kNoSide || found.contains(side.triangle)) continue;
         const auto corner = [&](int c) -> const Vector3d& { return surface_.mesh.corner(side.triangle, c); };
-        const Vector3d b = nearest_in_triangle(plane.centre(), corner(0), corner(1), corner(2));
+        const Vector3d b = nearest_in_triangle(plane.center(), corner(0), corner(1), corner(2));
         const Vector3d nearest = position(surface_.mesh, {side.triangle, b});
-        if ((nearest - plane.centre()).norm() >= kRadius * pitch) continue;
+        if ((nearest - plane.center()).norm() >= kRadius * pitch) continue;
         found.insert(side.triangle);
         open.push_back(side.triangle);
       }
@@ -132,7 +132,7 @@ class PatchMaker {
       if (const double side = (corners[(k + 1) % 3] - corners[k]).norm(); side > length) length = side, longest = k;
     const Vector3d middle = (corners[0] + corners[1] + corners[2]) / 3;
     if (length > .45 * pitch) {
-      if ((middle - plane.centre()).norm() - length > kRadius * pitch) return;
+      if ((middle - plane.center()).norm() - length > kRadius * pitch) return;
       const Vector3d half = (corners[longest] + corners[(longest + 1) % 3]) / 2;
       std::array<Vector3d, 3> a = corners, b = corners;
       a[(longest + 1) % 3] = half;
@@ -210,16 +210,16 @@ Spectrum spectrum_of(const std::vector<double>& ring_powers) {
 }  // namespace
 
 Spectrum SurfaceQuality::spectrum(std::span<const Dot> dots, std::uint64_t seed) const {
-  if (dots.size() < kLeastDots)
-    throw InputError("", "a spectrum on a surface needs at least " + std::to_string(kLeastDots) + " dots");
+  if (dots.size() < kMinDots)
+    throw InputError("", "a spectrum on a surface needs at least " + std::to_string(kMinDots) + " dots");
   const Implementation& surface = *implementation_;
   std::vector<Vector3d> places(dots.size());
   for (std::size_t i = 0; i < dots.size(); ++i) places[i] = dots[i].position_O;
   const PointTree<3> tree(places);
   const PatchMaker maker(surface, dots, tree);
-  std::vector<std::vector<double>> of_patches(kMostPatches);
-  tbb::parallel_for(std::size_t{0}, kMostPatches, [&](std::size_t i) {
-    const ShapeNumbers number({kMostPatches, seed}, 8, i);
+  std::vector<std::vector<double>> of_patches(kMaxPatches);
+  tbb::parallel_for(std::size_t{0}, kMaxPatches, [&](std::size_t i) {
+    const ShapeNumbers number({kMaxPatches, seed}, 8, i);
     const FlatPatch patch =
         maker.make(surface.random_point(number(0), number(1), number(2)), 2 * std::numbers::pi * number(3));
     if (patch.is_flat_enough && patch.squares > 0) of_patches[i] = powers(patch);

@@ -18,14 +18,14 @@ class TriangleTree {
   /// Sum of the masses of the triangles that lie wholly within the ball; the others that it touches are handed to
   /// `partly(triangle)`, whose results are added.
   template <class Partly>
-  double mass_within(const Eigen::Vector3d& centre, double radius, const Partly& partly) const {
-    return mass_below({centre, radius}, partly, 0, 0, order_.size());
+  double mass_within(const Eigen::Vector3d& center, double radius, const Partly& partly) const {
+    return mass_below({center, radius}, partly, 0, 0, order_.size());
   }
 
   /// Calls visit(triangle) for all triangles whose boxes the ball touches.
   template <class Visit>
-  void visit_near(const Eigen::Vector3d& centre, double radius, const Visit& visit) const {
-    mass_within(centre, radius, [&](std::uint32_t triangle) {
+  void visit_near(const Eigen::Vector3d& center, double radius, const Visit& visit) const {
+    mass_within(center, radius, [&](std::uint32_t triangle) {
       visit(triangle);
       return 0.;
     });
@@ -39,7 +39,7 @@ class TriangleTree {
     double mass = 0;
   };
   struct Sphere {
-    Eigen::Vector3d centre;
+    Eigen::Vector3d center;
     double radius;
   };
   struct Candidate {
@@ -61,8 +61,8 @@ class TriangleTree {
   double mass_below(const Sphere& sphere, const Partly& partly, std::size_t node, std::size_t begin,
                     std::size_t end) const {
     const double radius2 = sphere.radius * sphere.radius;
-    if (begin == end || nodes_[node].box.squaredExteriorDistance(sphere.centre) >= radius2) return 0;
-    if (farthest2(nodes_[node].box, sphere.centre) <= radius2) return nodes_[node].mass;
+    if (begin == end || nodes_[node].box.squaredExteriorDistance(sphere.center) >= radius2) return 0;
+    if (farthest2(nodes_[node].box, sphere.center) <= radius2) return nodes_[node].mass;
     if (is_leaf(node)) {
       double sum = 0;
       for (std::size_t i = begin; i < end; ++i) sum += partly(order_[i]);

@@ -30,7 +30,7 @@ class AtlasLayout {
     return static_cast<std::size_t>(r.y + row) * static_cast<std::size_t>(width_) +
            static_cast<std::size_t>(r.x + column);
   }
-  /// Metres between texels, along and across the longest edge.
+  /// Meters between texels, along and across the longest edge.
   Eigen::Vector2d step_m(const TriangleFrame& frame, std::uint32_t triangle) const;
   /// Texel coordinates of a triangle's corners.
   std::array<Eigen::Vector2d, 3> texel_corners(std::uint32_t triangle) const;

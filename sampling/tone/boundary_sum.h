@@ -5,7 +5,7 @@
 #include "sampling/tone/texel_integral.h"
 
 /// Integrals of a bilinear tone over a polygon, as sums over straight pieces of its boundary (Green's theorem), each
-/// piece within one cell of the grid of texel centres. Along a piece the integrands are polynomials of degree at most
+/// piece within one cell of the grid of texel centers. Along a piece the integrands are polynomials of degree at most
 /// 5: Gauss's three places are exact. Pieces are gathered and summed four side by side.
 namespace hilbrush {
 
@@ -25,9 +25,9 @@ struct BoundaryCell {
 class BoundarySum {
  public:
   /// A piece that begins at (s, t), from the cell's lower left corner, and goes (ds, dt). `cell` has to stay until the
-  /// sum is taken or kMost more pieces are added.
+  /// sum is taken or kMax more pieces are added.
   void add(double s, double t, double ds, double dt, const BoundaryCell& cell) {
-    if (count_ == kMost) flush();
+    if (count_ == kMax) flush();
     pieces_.s[count_] = s, pieces_.t[count_] = t, pieces_.ds[count_] = ds, pieces_.dt[count_] = dt;
     pieces_.cells[count_++] = &cell;
   }
@@ -38,11 +38,11 @@ class BoundarySum {
     return total_;
   }
 
-  static constexpr std::size_t kLanes = 4, kMost = 32;
+  static constexpr std::size_t kLanes = 4, kMax = 32;
   struct Pieces {
-    using Numbers = std::array<double, kMost>;
+    using Numbers = std::array<double, kMax>;
     alignas(32) Numbers s, t, ds, dt;
-    std::array<const BoundaryCell*, kMost> cells;
+    std::array<const BoundaryCell*, kMax> cells;
   };
 
  private:

@@ -7,7 +7,7 @@
 
 #include "sampling/tone/boundary_sum.h"
 
-/// The way along a polygon's edges from cell to cell of the grid of texel centres.
+/// The way along a polygon's edges from cell to cell of the grid of texel centers.
 namespace hilbrush {
 
 /// Where an edge crosses the lines between columns (or rows), as shares of its length.
@@ -16,7 +16,7 @@ class Crossings {
   /// `from` in units of columns; `column` holds it, or, when walking downwards from a line, the one below.
   Crossings(double from, double step, std::int64_t column) {
     // What hardly moves crosses nothing.
-    if (std::abs(step) < kLeastStep) return;
+    if (std::abs(step) < kMinStep) return;
     line_ = static_cast<double>(step > 0 ? column + 1 : column) - from;
     per_step_ = 1 / step;
     steps_[1] = step > 0 ? 1 : -1;
@@ -31,7 +31,7 @@ class Crossings {
   int step(bool goes_on) const { return steps_[goes_on]; }
 
  private:
-  static constexpr double kLeastStep = 1e-300;
+  static constexpr double kMinStep = 1e-300;
 
   double line_ = kNever, per_step_ = 1;  ///< from the edge's begin
   std::array<int, 2> steps_{};
@@ -41,7 +41,7 @@ class Crossings {
 ///   std::int64_t column_of(double x, double step), row_of(double y, double step)   of a walk in that direction
 ///   void enter(std::int64_t column, std::int64_t row)
 ///   bool has_next_column(double step), has_next_row(double step)   there is one in that direction
-///   void step(int columns, int rows)   to a neighbour
+///   void step(int columns, int rows)   to a neighbor
 ///   const BoundaryCell& here()        valid as BoundarySum::add() asks
 template <class Cells>
 void add_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, Cells& cells, BoundarySum& sum) {

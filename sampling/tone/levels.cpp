@@ -69,7 +69,7 @@ void share_missing_energy(DotSequence& dots, const ToneField& asked, std::span<c
 
 std::vector<double> energy_levels(int count, double asked_max) {
   CHECK_LE(1, count);
-  CHECK_LE(count, kMostLevels);
+  CHECK_LE(count, kMaxLevels);
   if (count == 1) return {1};
   std::vector<double> levels;  // for paint whose black takes twice the full energy
   if (count == 2) levels = {.75, 3};

@@ -13,10 +13,10 @@
 ///
 /// Measured on flat fields (spot 1.41 pitches, saturating paint): grain is what light tones have (rms .05 at tone .1
 /// against .007 at .9), and most dots are spent on dark ones; energies of .8, 1.6 and 3 and .4 dots a pitch squared
-/// came out best of those tried, for pictures full of white and for pictures full of greys.
+/// came out best of those tried, for pictures full of white and for pictures full of grays.
 namespace hilbrush {
 
-inline constexpr int kMostLevels = 4;
+inline constexpr int kMaxLevels = 4;
 inline constexpr double kEnoughDots = .4;
 
 /// The `count` energies (1 = blackens one pitch squared), rising, in proportion to asked_max, the most that a tone

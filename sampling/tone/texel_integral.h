@@ -3,7 +3,7 @@
 
 namespace hilbrush {
 
-/// The tone at the four texels around a cell of the grid of texel centres; bilinear between them.
+/// The tone at the four texels around a cell of the grid of texel centers; bilinear between them.
 struct CellTones {
   double a, b;  ///< lower row: left and right
   double c, d;  ///< upper row

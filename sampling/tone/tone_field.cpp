@@ -15,36 +15,36 @@ namespace {
 using Eigen::Vector2d;
 
 /// A triangle that spans more texels than this repeats its texture beyond all sense and is painted in its mean tone.
-constexpr double kMostTexels = 1 << 16;
+constexpr double kMaxTexels = 1 << 16;
 /// Least height, in texels, that a triangle gets in its texture: one that is collapsed there would have no polygons to
 /// integrate over.
-constexpr double kLeastTexels = 1e-3;
+constexpr double kMinTexels = 1e-3;
 /// Of all layers together, about; and the finest that a texel is cut, along a side.
 constexpr double kRefinedTexels = 12e6;
-constexpr int kMostRefinement = 15;
+constexpr int kMaxRefinement = 15;
 
 /// Opens a triangle that is a line or a point in its texture, by a thousandth of a texel.
 void open_collapsed(std::array<Vector2d, 3>& p) {
   // Most are as high as wide, and no side is longer than the first two together.
   const Vector2d u = p[1] - p[0], v = p[2] - p[0];
   const double area = std::abs(cross(u, v)), reach = u.lpNorm<1>() + v.lpNorm<1>();
-  if (area >= kLeastTexels * reach && reach >= kLeastTexels) return;
+  if (area >= kMinTexels * reach && reach >= kMinTexels) return;
   int apex = 0;
   double longest = -1;
   for (int k = 0; k < 3; ++k) {
     const double length = (p[(k + 2) % 3] - p[(k + 1) % 3]).norm();
     if (length > longest) longest = length, apex = k;
   }
-  if (longest < kLeastTexels) {
-    p[1] = p[0] + Vector2d(kLeastTexels, 0);
-    p[2] = p[0] + Vector2d(0, kLeastTexels);
+  if (longest < kMinTexels) {
+    p[1] = p[0] + Vector2d(kMinTexels, 0);
+    p[2] = p[0] + Vector2d(0, kMinTexels);
     return;
   }
   const Vector2d a = p[(apex + 1) % 3], along = (p[(apex + 2) % 3] - a) / longest;
   const double height = cross(along, p[apex] - a);
-  if (std::abs(height) >= kLeastTexels) return;
+  if (std::abs(height) >= kMinTexels) return;
   const Vector2d across(-along.y(), along.x());
-  p[apex] += (std::copysign(kLeastTexels, height) - height) * across;
+  p[apex] += (std::copysign(kMinTexels, height) - height) * across;
 }
 
 bool is_painted_by_untextured_rule(const Material& material, Untextured rule, bool any_colored) {
@@ -88,20 +88,20 @@ ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& ma
   const auto p = texel_corners(t);
   for (int k = 0; k < 3; ++k)
     if (!((p[static_cast<std::size_t>((k + 1) % 3)] - p[static_cast<std::size_t>(k)]).lpNorm<Eigen::Infinity>() <=
-          kMostTexels))
+          kMaxTexels))
       return {Source::kMean, source.layer};
   return source;
 }
 
 /// The curve bends between texels too: black beside white asks for much less in the middle than the mean of both. So
-/// the curve is applied to texels finer by a whole odd factor, whose centres fall on the texture's own and which repeat
+/// the curve is applied to texels finer by a whole odd factor, whose centers fall on the texture's own and which repeat
 /// its interpolation exactly; as fine as a fair share of memory allows.
 int ToneField::refinement_of(const Texture& texture) const {
   if (options_.curve.wanted.empty()) return 1;
   const double share = kRefinedTexels / static_cast<double>(mesh_.textures.size());
   const double texels = static_cast<double>(texture.width) * texture.height;
   int refinement = 1;
-  while (refinement < kMostRefinement && texels * (refinement + 2) * (refinement + 2) <= share) refinement += 2;
+  while (refinement < kMaxRefinement && texels * (refinement + 2) * (refinement + 2) <= share) refinement += 2;
   return refinement;
 }
 

@@ -12,7 +12,7 @@
 
 /// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is
 /// measured against) and as asked (after it: the density of dots). Bilinear between texels, linear between vertex
-/// colours.
+/// colors.
 namespace hilbrush {
 
 class ToneField {
@@ -39,7 +39,7 @@ class ToneField {
   }
 
  private:
-  friend class TriangleTone;  // for the integrals of colours
+  friend class TriangleTone;  // for the integrals of colors
 
   /// What one triangle's tone comes from.
   struct Source {
@@ -65,7 +65,7 @@ class ToneField {
   /// A texture's asked tones, for one factor of luminance and opacity.
   struct Layer {
     int texture = 0;
-    float luminance_factor = 1;  ///< below 0: the texture replaces the surface's colour
+    float luminance_factor = 1;  ///< below 0: the texture replaces the surface's color
     double opacity = 1;
     TexelAddressing addressing;
     int refinement = 1;  ///< texels of `tones` for one of the texture's, along a side

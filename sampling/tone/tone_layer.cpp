@@ -38,11 +38,11 @@ constexpr std::array<Orbit, 2> kTriangleOrbits{{{0.108103018168070, 0.4459484909
 /// The cells around a small polygon, all made beforehand: most of its edges pass most of them.
 class ToneLayer::WindowCells {
  public:
-  static constexpr Index kMostCells = 36;
+  static constexpr Index kMaxCells = 36;
 
   WindowCells(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0, Index columns, Index rows)
       : columns_(columns), rows_(rows) {
-    std::array<Index, kMostCells + 1> texels;
+    std::array<Index, kMaxCells + 1> texels;
     for (Index i = 0; i <= columns; ++i)
       texels[static_cast<std::size_t>(i)] = texel_index(x0 + i, layer.width_, addressing.repeat_x);
     const auto fill = [&](Index row, Line& line) {
@@ -99,11 +99,11 @@ class ToneLayer::WindowCells {
   struct TexelOnLine {
     double tone, f, xf, ff;
   };
-  using Line = std::array<TexelOnLine, kMostCells + 1>;
+  using Line = std::array<TexelOnLine, kMaxCells + 1>;
 
   Index columns_, rows_;
   Index column_ = 0, row_ = 0;
-  std::array<BoundaryCell, kMostCells> cells_;
+  std::array<BoundaryCell, kMaxCells> cells_;
 };
 
 /// The cells along the way through a large polygon. Between rows j and j + 1 the tone is (1 - t) f(x) + t g(x), t = y -
@@ -205,7 +205,7 @@ class ToneLayer::WalkedCells {
   const float* upper_ = nullptr;
   CellTones here_{};
   RowSums sums_{};
-  std::array<BoundaryCell, BoundarySum::kMost + 1> cells_;
+  std::array<BoundaryCell, BoundarySum::kMax + 1> cells_;
   std::size_t next_ = 0;
 };
 
@@ -340,7 +340,7 @@ TexelIntegral ToneLayer::integrate(std::span<const Eigen::Vector2d> polygon, Tex
       return integrate_in_cell(polygon, {lower[left], lower[right], upper[left], upper[right]},
                                {static_cast<double>(x0), static_cast<double>(y0)});
     }
-    if (columns * rows <= WindowCells::kMostCells) {
+    if (columns * rows <= WindowCells::kMaxCells) {
       WindowCells cells(*this, addressing, x0, y0, columns, rows);
       return sum_along(cells, x0, y0);
     }

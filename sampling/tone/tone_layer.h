@@ -8,7 +8,7 @@
 #include "sampling/tone/texel_integral.h"
 
 /// A tone picture that can be looked up at a point and integrated exactly over a polygon, both with the same bilinear
-/// interpolation and the same addressing. Coordinates are texels: texel (i, j) has its centre at (i, j).
+/// interpolation and the same addressing. Coordinates are texels: texel (i, j) has its center at (i, j).
 namespace hilbrush {
 
 class ToneLayer {

@@ -12,7 +12,7 @@
 namespace hilbrush {
 
 /// No piece of a triangle that sampling makes has more corners.
-inline constexpr std::size_t kMostPolygonCorners = 24;
+inline constexpr std::size_t kMaxPolygonCorners = 24;
 
 /// Bilinear look-up of texel_value(index) in a picture of which only the four texels around the point are computed.
 template <class TexelValue>

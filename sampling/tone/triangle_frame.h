@@ -5,7 +5,7 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// A triangle in its own plane: x runs along its longest edge, y from there to the apex; metres.
+/// A triangle in its own plane: x runs along its longest edge, y from there to the apex; meters.
 namespace hilbrush {
 
 /// What a box cuts out of a triangle, by second and third barycentric coordinates; no corners if they don't meet.

@@ -38,7 +38,7 @@ ToneIntegral TriangleTone::integrate(std::span<const Vector2d> polygon) const {
 }
 
 ToneIntegral TriangleTone::integrate_texels(std::span<const Vector2d> polygon) const {
-  std::array<Vector2d, kMostPolygonCorners> texels;
+  std::array<Vector2d, kMaxPolygonCorners> texels;
   CHECK_LE(polygon.size(), texels.size());
   double twice_area_b = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {

@@ -67,7 +67,7 @@ class SimAxisGroup final : public AxisGroup<N> {
     const std::lock_guard lock(mutex_);
     const double now = clock_.now_s();
     if (state_now(now) != DeviceState::kReady) refuse("moved", now);
-    if (!(settle_s >= 0) || settle_s > kLongestSettleS)
+    if (!(settle_s >= 0) || settle_s > kMaxSettleS)
       throw DriverError("the " + name_ + " refuses a settle time that is no time");
     for (std::size_t i = 0; i < N; ++i) check_limits(i, target[i]);
 
@@ -125,7 +125,7 @@ class SimAxisGroup final : public AxisGroup<N> {
   }
 
  private:
-  static constexpr double kLongestSettleS = 60;
+  static constexpr double kMaxSettleS = 60;
 
   /// kReady turns to kMoving and back by itself, with time.
   DeviceState state_now(double now) const {

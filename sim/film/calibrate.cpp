@@ -62,7 +62,7 @@ double paint_step(const CellDescription& cell, double pitch_m, PictureOptions op
 }
 
 /// Readings in rising order of what was asked; a reading that falls (by the grain of the dots) takes the mean with its
-/// neighbours.
+/// neighbors.
 std::vector<WedgeStep> monotone(std::vector<WedgeStep> steps) {
   std::sort(steps.begin(), steps.end(), [](const WedgeStep& a, const WedgeStep& b) { return a.asked < b.asked; });
   // Pool adjacent violators: blocks of equal mean until the means rise.

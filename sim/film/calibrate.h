@@ -7,7 +7,7 @@
 #include "sampling/options/tone_options.h"
 #include "sampling/place_picture.h"
 
-/// From a grey wedge to a tone curve (README, "Tone"). The wedge is a flat strip of 11 or more steps; each is painted
+/// From a gray wedge to a tone curve (README, "Tone"). The wedge is a flat strip of 11 or more steps; each is painted
 /// and its mean coverage read.
 namespace hilbrush {
 

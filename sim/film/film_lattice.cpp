@@ -44,8 +44,8 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 }  // namespace
 
-/// A grid in the coordinates of an axis: two across it, from the axis, and the depth along it. The place at s metres
-/// along the longest edge and y metres above it is start + s along + y up.
+/// A grid in the coordinates of an axis: two across it, from the axis, and the depth along it. The place at s meters
+/// along the longest edge and y meters above it is start + s along + y up.
 struct FilmLattice::Frame {
   Eigen::Vector2d start, along, up;
   double start_depth, along_depth, up_depth;

@@ -62,7 +62,7 @@ void OrthographicView::fill(std::uint32_t triangle) {
   const int last_row = std::min(height_ - 1, static_cast<int>(std::floor(std::max({a.y(), b.y(), c.y()}) - .5)));
   // Along an outline a front and a back face meet at equal depth: the front, which carries the film, shall win.
   const double behind_m = mesh_.area_vector(triangle).dot(forward_O_) < 0 ? 0 : .05 * pixel_m_;
-  constexpr double kRounding = 1e-9;  // neighbours share their border's pixels rather than leave gaps
+  constexpr double kRounding = 1e-9;  // neighbors share their border's pixels rather than leave gaps
   for (int row = first_row; row <= last_row; ++row) {
     const Eigen::Vector3d at_left = coordinates.constant + (row + .5) * coordinates.dy;
     double low = x_min, high = x_max;

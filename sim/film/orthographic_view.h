@@ -43,7 +43,7 @@ class OrthographicView {
  private:
   static constexpr std::uint32_t kNothing = std::numeric_limits<std::uint32_t>::max();
 
-  Eigen::Vector3d project(const Eigen::Vector3d& p_O) const;  ///< x and y in pixels, depth in metres
+  Eigen::Vector3d project(const Eigen::Vector3d& p_O) const;  ///< x and y in pixels, depth in meters
   void fill(std::uint32_t triangle);
   std::uint32_t triangle_at(int x, int y) const { return triangles_[static_cast<std::size_t>(y) * width_ + x]; }
 

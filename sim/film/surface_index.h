@@ -24,7 +24,7 @@ class SurfaceIndex {
   /// The first triangle along the ray, from either side. Embree finds it in single precision; the place on it is
   /// computed in double.
   std::optional<RayHit> cast(const Eigen::Vector3d& origin_O, const Eigen::Vector3d& direction_O) const;
-  /// Replaces `triangles` by those whose bounding box comes within radius_m of the centre (a superset of the triangles
+  /// Replaces `triangles` by those whose bounding box comes within radius_m of the center (a superset of the triangles
   /// that do), rising.
   void triangles_near(const Eigen::Vector3d& center_O, double radius_m, std::vector<std::uint32_t>& triangles) const;
 

@@ -97,8 +97,8 @@ Color mixed(const Color& a, const Color& b, double share_of_b) {
 
 Color tone_color(double coverage, const CellDescription::Paint& paint) {
   const double reflectance = 1 - coverage * (1 - paint.reflectance_black / paint.reflectance_white);
-  const auto grey = static_cast<std::uint8_t>(std::lround(255 * srgb_encoded(reflectance)));
-  return {grey, grey, grey};
+  const auto gray = static_cast<std::uint8_t>(std::lround(255 * srgb_encoded(reflectance)));
+  return {gray, gray, gray};
 }
 
 Color error_color(double error) {

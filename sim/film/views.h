@@ -20,7 +20,7 @@ std::array<ViewDirection, 6> picture_views();
 /// Writes views/<name>.png (wanted | painted | error side by side, name = front, right, back, left, top, bottom) and
 /// exposure.png (contact sheet, captioned) into `folder`. `skipped_O` are the positions of skipped dots, marked in red
 /// where they are seen. Coverage is shown as the reflectance of the paint, relative to unpainted; the error as the
-/// Gaussian mean over a pitch of painted - wanted, orange where too dark, blue where too light, in full colour at .2.
+/// Gaussian mean over a pitch of painted - wanted, orange where too dark, blue where too light, in full color at .2.
 /// Faces seen from behind, which carry no film, are brown. Returns the files written. @throws InputError naming a file
 /// that can't be written.
 std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneField& tone,

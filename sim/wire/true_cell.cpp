@@ -257,7 +257,7 @@ void TrueCell::end_light() {
   if (sink_) sink_(ended);
 }
 
-void TrueCell::darken() {
+void TrueCell::disarm() {
   is_ordered_ = false;
   end_light();
 }

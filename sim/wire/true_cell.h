@@ -98,7 +98,7 @@ class TrueCell {
   void set_time_record(TimeRecord* times) { times_ = times; }
   void set_sink(EmissionSink sink) { sink_ = std::move(sink); }
   /// Ends the light and records it: when power goes off.
-  void darken();
+  void disarm();
 
  private:
   struct Axis {

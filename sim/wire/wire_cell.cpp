@@ -147,8 +147,8 @@ timespec WireCell::Implementation::list_descriptors() {
   for (const auto& connection : connections)
     polled.push_back(
         {connection->fd(), static_cast<short>(connection->wants_to_write() ? POLLIN | POLLOUT : POLLIN), 0});
-  constexpr double kLongestS = 1;
-  const double wall_s = std::clamp(clock.wall_s(next_event_s() - clock.now_s()), 0., kLongestS);
+  constexpr double kMaxS = 1;
+  const double wall_s = std::clamp(clock.wall_s(next_event_s() - clock.now_s()), 0., kMaxS);
   return {static_cast<time_t>(wall_s), static_cast<long>((wall_s - std::floor(wall_s)) * 1e9)};
 }
 
@@ -187,7 +187,7 @@ WireCell::~WireCell() {
   implementation_->wake();
   implementation_->thread.join();
   implementation_->catch_up();
-  implementation_->devices.cell().darken();
+  implementation_->devices.cell().disarm();
 }
 
 const WireEndpoints& WireCell::endpoints() const {

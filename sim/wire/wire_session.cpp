@@ -14,7 +14,7 @@ void WireSession::receive(std::string_view bytes) {
     input_.erase(0, length);
     take_message(message);
   }
-  if (input_.size() > kLongestMessage) input_.clear();
+  if (input_.size() > kMaxMessage) input_.clear();
 }
 
 void WireSession::take_message(std::string_view message) {

@@ -14,7 +14,7 @@ namespace hilbrush {
 class WireSession {
  public:
   /// Longest line or frame that any device here takes.
-  static constexpr std::size_t kLongestMessage = 1024;
+  static constexpr std::size_t kMaxMessage = 1024;
 
   WireSession(WireDevice device, TrueCell& cell, FaultInjector& faults)
       : cell_(cell), faults_(faults), device_(device) {}

@@ -69,7 +69,7 @@ void run_on_mesh(const std::string& file, std::uint64_t count, std::size_t trian
   PlacementOptions placement;
   placement.size_m = .08;
   const RepairedMesh repaired = repair_mesh(place_on_table(load_model(file, load_image_file), placement));
-  // Its colours are left out: constant tone.
+  // Its colors are left out: constant tone.
   TexturedMesh mesh = test::subdivided(repaired.mesh, triangles);
   for (Material& material : mesh.materials) material = {"black", ColorSource::kColors};
   for (auto& corners : mesh.corner_luminance) corners = {0, 0, 0};

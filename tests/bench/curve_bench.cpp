@@ -33,7 +33,7 @@ using namespace hilbrush;
 
 constexpr int kRepeats = 3;
 /// Strata are measured again one by one up to so many.
-constexpr std::uint64_t kMostChecked = 100'000;
+constexpr std::uint64_t kMaxChecked = 100'000;
 
 struct Seconds {
   double cpu = 0, wall = 0;
@@ -148,7 +148,7 @@ void measure(const char* title, const SurfaceCurve& curve, const ToneOptions& to
     stream_dots(mass, options, [&](std::span<const Dot> dots) {
       for (const Dot& dot : dots) hash.add(dot);
     });
-    const bool is_checked = count <= kMostChecked && threads == 1;
+    const bool is_checked = count <= kMaxChecked && threads == 1;
     std::printf("%10llu %7.4f %7.4f %13.2f %12.2f %5.3f  %-10s  %016llx\n", static_cast<unsigned long long>(count),
                 s.cpu, s.wall, static_cast<double>(count) / s.cpu * 1e-6,
                 static_cast<double>(report.patch_count) / static_cast<double>(count), report.path_constant,
@@ -167,15 +167,15 @@ void run(int argc, char** argv) {
   const SurfaceCurve curve(mesh);
   std::size_t quads = 0, listed = 0;
   Seconds tree;
-  for (const Sheet& sheet : curve.implementation().sheets) {
-    Sheet again = sheet;
+  for (const Chart& chart : curve.implementation().charts) {
+    Chart again = chart;
     tree.cpu += time(kRepeats, [&] {
                   again.base_quads.clear();
                   again.face_lists.clear();
                   build_base_tree(again, mesh);
                 }).cpu;
-    quads += sheet.base_quads.size();
-    listed += sheet.face_lists.size();
+    quads += chart.base_quads.size();
+    listed += chart.face_lists.size();
   }
   std::printf(
       "%zu triangles, %zu components; mapped and divided in %.2f s CPU, %.2f s wall; of it the base tree %.3f s CPU\n",

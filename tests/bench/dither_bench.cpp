@@ -18,7 +18,7 @@ using namespace hilbrush;
 using bench::Original;
 using Eigen::Vector2d;
 
-/// A picture on a rectangle one metre wide.
+/// A picture on a rectangle one meter wide.
 class Print {
  public:
   Print(const Original& picture, std::uint64_t count)

@@ -106,11 +106,11 @@ void print_dots(const TexturedMesh& mesh, const SurfaceCurve& curve, std::size_t
 }
 
 void run(const TexturedMesh& mesh, std::size_t dots, Stages& stages, bool is_last) {
-  const Neighbours neighbours = stages.time("1 neighbours", [&] { return find_neighbours(mesh.triangles); });
-  const auto components = stages.time("2 components", [&] { return find_components(mesh, neighbours); });
+  const Neighbors neighbors = stages.time("1 neighbors", [&] { return find_neighbors(mesh.triangles); });
+  const auto components = stages.time("2 components", [&] { return find_components(mesh, neighbors); });
   for (const Component& component : components) {
     std::string reason;
-    auto cut = stages.time("3 cut", [&] { return cut_to_disk(mesh, neighbours, component, reason); });
+    auto cut = stages.time("3 cut", [&] { return cut_to_disk(mesh, neighbors, component, reason); });
     if (cut) stages.time("4 map", [&] { return map_to_square(*cut); });
   }
   stages.finish_repeat();

@@ -73,10 +73,10 @@ int main(int argc, char** argv) {
     double shear = 0;
     for (long i = 0; i < repeats; ++i) {
       const double begin = cpu_s();
-      const Neighbours neighbours = find_neighbours(mesh.triangles);
-      const auto components = find_components(mesh, neighbours);
+      const Neighbors neighbors = find_neighbors(mesh.triangles);
+      const auto components = find_components(mesh, neighbors);
       std::string reason;
-      auto cut = cut_to_disk(mesh, neighbours, components.at(0), reason);
+      auto cut = cut_to_disk(mesh, neighbors, components.at(0), reason);
       if (!cut) throw std::runtime_error(reason);
       const double cut_s = cpu_s() - begin;
       const RivalMesh same = rival_mesh(cut->disk);

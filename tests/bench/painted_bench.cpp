@@ -150,7 +150,7 @@ Texture texture_of(int width, int height, const std::function<double(double, dou
 }
 
 /// Ten fields from light to dark (figure 7.15).
-TexturedMesh grey_wedge() {
+TexturedMesh gray_wedge() {
   return card(.100, .020, texture_of(1000, 200, [](double u, double) { return std::floor(u * 10) / 10 + .05; }));
 }
 
@@ -231,7 +231,7 @@ void paint_figures(const std::string& eggcup, const std::filesystem::path& folde
   paint_figure("7.11_even_cup", cup_with(cup, [](double) { return .3; }), 50, cell, folder);
   paint_figure("7.13_gradient", gradient_with_rings(), 100, cell, folder);
   paint_figure("7.14_picture_cup", cup, 100, cell, folder);
-  paint_figure("7.15_grey_wedge", grey_wedge(), 50, cell, folder);
+  paint_figure("7.15_gray_wedge", gray_wedge(), 50, cell, folder);
   paint_figure("7.16_striped_cup_50", cup_with(cup, stripes), 50, cell, folder);
   paint_figure("7.16_striped_cup_100", cup_with(cup, stripes), 100, cell, folder);
 }

@@ -241,7 +241,7 @@ TEST_F(Jog, RefusesWhatItMustNotDoAndMovesNothing) {
   for (const Refusal& refusal :
        {Refusal{"j1 --by-deg 1", 5, "nothing was moved"}, Refusal{"j1 --by-deg 16 --yes", 3, "at most 15"},
         Refusal{"j1 --by-deg 0 --yes", 3, "at most"}, Refusal{"j1 --by-mm 1 --yes", 3, "degrees"},
-        Refusal{"j3 --by-deg 1 --yes", 3, "millimetres"}, Refusal{"j3 --by-mm 21 --yes", 3, "at most 20"},
+        Refusal{"j3 --by-deg 1 --yes", 3, "millimeters"}, Refusal{"j3 --by-mm 21 --yes", 3, "at most 20"},
         Refusal{"j3 --by-mm nan --yes", 3, "at most 20"}, Refusal{"j5 --by-deg 1 --yes", 2, "AXIS"},
         Refusal{"j1 --yes", 3, "degrees"}}) {
     SCOPED_TRACE(refusal.flags);

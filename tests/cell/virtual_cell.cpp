@@ -32,8 +32,8 @@ bool is_near(const std::array<double, N>& a, const std::array<double, N>& b) {
 }  // namespace
 
 void VirtualClock::sleep_until(double time_s) {
-  constexpr double kLongestS = 3600;
-  devices_.advance(std::min(time_s, now_s() + kLongestS));
+  constexpr double kMaxS = 3600;
+  devices_.advance(std::min(time_s, now_s() + kMaxS));
   if (on_time) on_time();
 }
 

@@ -11,7 +11,7 @@
 namespace hilbrush::test {
 
 struct WitnessOptions {
-  double joint_tolerance = 2e-5;  ///< rad or m: what quantised axes may be off
+  double joint_tolerance = 2e-5;  ///< rad or m: what quantized axes may be off
   /// Of a whole pulse: what a laser may be off before its driver objects, and rounding.
   double energy_tolerance = 6e-3;
   /// The longest light allowed beyond the wanted pulse: by default the resolution of a gate that counts milliseconds

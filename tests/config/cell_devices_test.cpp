@@ -60,7 +60,7 @@ TEST(CellDevices, RealDevicesAreReadInTheCellsUnits) {
   EXPECT_EQ(dobot.dashboard_port, 29999);
   EXPECT_EQ(dobot.motion_port, 3);
   EXPECT_NEAR(dobot.scales[0].to_device(91 * kDegree), -1, 1e-12);
-  EXPECT_NEAR(dobot.scales[0].to_ours(-1), 91 * kDegree, 1e-12);
+  EXPECT_NEAR(dobot.scales[0].to_si(-1), 91 * kDegree, 1e-12);
   EXPECT_NEAR(dobot.scales[2].to_device(.0125), 2.5, 1e-12);
   EXPECT_NEAR(dobot.bounds[0].max, 132 * kDegree, 1e-12);
   const auto& table = std::get<ModbusGroupOptions<2>>(options.table);

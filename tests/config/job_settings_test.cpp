@@ -149,7 +149,7 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"dry_run":"yes"})", "$.dry_run: expected true or false, found \"yes\""},
       {R"({"size_cm":8})", "$.size_cm: unknown key; did you mean \"size_mm\"?"},
       {R"({"size":80})", "$.size: unknown key; did you mean \"size_mm\"?"},
-      {R"({"colour":1})", "$.colour: unknown key"},
+      {R"({"color":1})", "$.color: unknown key"},
       {R"([])", "$: expected an object, found a list of 0"},
   };
   for (const Case& c : cases) EXPECT_EQ(settings_error_of(c.text), c.error);

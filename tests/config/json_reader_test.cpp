@@ -19,14 +19,14 @@ void read_sample(JsonObject& json) {
   json.integer("count", 1, 100);
   json.boolean("on");
   json.text("name", 8);
-  json.choice("colour", {"red", "green", "blue"});
+  json.choice("color", {"red", "green", "blue"});
   json.numbers("curve", 2, 3, {0, 1});
   json.objects("parts", 2, [](JsonObject& part) { part.quantity("radius_mm", {0, 10}); });
   json.optional_number("extra", {0, kInfinity});
 }
 
 const std::string kSample =
-    R"({"axis":{"max_deg":90},"share":0.5,"count":7,"on":true,"name":"cup","colour":"red","curve":[0,1],"parts":[{"radius_mm":2}]})";
+    R"({"axis":{"max_deg":90},"share":0.5,"count":7,"on":true,"name":"cup","color":"red","curve":[0,1],"parts":[{"radius_mm":2}]})";
 
 /// kSample with the first `from` replaced.
 std::string changed(const std::string& from, const std::string& to) {
@@ -76,8 +76,8 @@ TEST(JsonReader, EveryMistakeIsRefusedWithItsPathAndASentence) {
       {"\"cup\"", "\"123456789\"", "f.json: $.name: expected a text of 1 to 8 bytes, found 9"},
       {"\"cup\"", "\"a\\nb\"", "f.json: $.name: expected a text without control characters, found \"a\\nb\""},
       {"\"cup\"", "{}", "f.json: $.name: expected a text, found an object"},
-      {"\"red\"", "\"rot\"", "f.json: $.colour: expected \"red\", \"green\" or \"blue\", found \"rot\""},
-      {"\"red\"", "0", "f.json: $.colour: expected \"red\", \"green\" or \"blue\", found 0"},
+      {"\"red\"", "\"rot\"", "f.json: $.color: expected \"red\", \"green\" or \"blue\", found \"rot\""},
+      {"\"red\"", "0", "f.json: $.color: expected \"red\", \"green\" or \"blue\", found 0"},
       {"[0,1]", "[0]", "f.json: $.curve: expected a list of 2 to 3 numbers, found a list of 1"},
       {"[0,1]", "[0,1,1,1]", "f.json: $.curve: expected a list of 2 to 3 numbers, found a list of 4"},
       {"[0,1]", "[0,\"1\"]", "f.json: $.curve[1]: expected a number from 0 to 1, found \"1\""},

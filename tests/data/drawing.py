@@ -1,6 +1,6 @@
 """What the generators of this folder draw with: an image of floats, lines, polygons and letters with soft edges, and PNG files.
 
-Standard library only. Colours are sRGB-encoded and run from 0 to 1; x goes right and y down, in pixels."""
+Standard library only. Colors are sRGB-encoded and run from 0 to 1; x goes right and y down, in pixels."""
 
 import array
 import math
@@ -9,21 +9,21 @@ import zlib
 
 
 class Canvas:
-    """An image with 1 (grey) or 3 (red, green, blue) channels."""
+    """An image with 1 (gray) or 3 (red, green, blue) channels."""
 
     def __init__(self, width, height, channels, background=1.0):
         self.width, self.height, self.channels = width, height, channels
         self.values = array.array("f", [background]) * (width * height * channels)
 
-    def blend(self, x, y, colour, coverage):
-        """Lays `colour` over one pixel; columns wrap around, rows outside the image are left out."""
+    def blend(self, x, y, color, coverage):
+        """Lays `color` over one pixel; columns wrap around, rows outside the image are left out."""
         if coverage <= 0 or not 0 <= y < self.height:
             return
         start = (y * self.width + x % self.width) * self.channels
         for c in range(self.channels):
-            self.values[start + c] += (colour[c] - self.values[start + c]) * min(coverage, 1)
+            self.values[start + c] += (color[c] - self.values[start + c]) * min(coverage, 1)
 
-    def polygon(self, points, colour, opacity=1.0):
+    def polygon(self, points, color, opacity=1.0):
         """Fills a simple polygon; 3 x 3 samples a pixel make its edge soft."""
         ys = [p[1] for p in points]
         for y in range(math.floor(min(ys)), math.ceil(max(ys)) + 1):
@@ -31,13 +31,13 @@ class Canvas:
             for sub_y in (1 / 6, 3 / 6, 5 / 6):
                 crossings = sorted(_crossings(points, y + sub_y))
                 for left, right in zip(crossings[::2], crossings[1::2]):
-                    # Sample columns whose centre, (k + .5) / 3, is inside.
+                    # Sample columns whose center, (k + .5) / 3, is inside.
                     for k in range(math.ceil(left * 3 - 0.5), math.ceil(right * 3 - 0.5)):
                         counts[k // 3] = counts.get(k // 3, 0) + 1
             for x, count in counts.items():
-                self.blend(x, y, colour, opacity * count / 9)
+                self.blend(x, y, color, opacity * count / 9)
 
-    def line(self, points, width, colour, opacity=1.0):
+    def line(self, points, width, color, opacity=1.0):
         """Draws a polyline with round ends. Joints are not drawn twice: coverage comes from the nearest piece."""
         radius = width / 2
         nearest = {}
@@ -51,14 +51,14 @@ class Canvas:
                     if distance < nearest.get((x, y), radius + 0.5):
                         nearest[(x, y)] = distance
         for (x, y), distance in nearest.items():
-            self.blend(x, y, colour, opacity * min(1, radius + 0.5 - distance))
+            self.blend(x, y, color, opacity * min(1, radius + 0.5 - distance))
 
-    def text(self, text, x, y, height, width, colour, spacing=0.35):
+    def text(self, text, x, y, height, width, color, spacing=0.35):
         """Writes `text` with its baseline's left end at (x, y); returns where the next letter would start."""
         for letter in text:
             strokes, advance = LETTERS[letter]
             for stroke in strokes:
-                self.line([(x + px * height, y - py * height) for px, py in stroke], width, colour)
+                self.line([(x + px * height, y - py * height) for px, py in stroke], width, color)
             x += (advance + spacing) * height
         return x
 
@@ -124,7 +124,7 @@ def _filtered_row(row, above, step):
 
 
 def write_png(canvas, file):
-    """Writes an 8-bit grey or RGB PNG, tagged as sRGB."""
+    """Writes an 8-bit gray or RGB PNG, tagged as sRGB."""
     step, stride, data = canvas.channels, canvas.width * canvas.channels, canvas.to_bytes()
     above, rows = bytes(stride), []
     for y in range(canvas.height):

@@ -68,16 +68,16 @@ MOON = (0.70, 0.17)
 
 
 def sky(x, y, clouds):
-    colour = mix((0.16, 0.27, 0.46), (0.80, 0.82, 0.80), smooth(-0.05, 0.5, y))
+    color = mix((0.16, 0.27, 0.46), (0.80, 0.82, 0.80), smooth(-0.05, 0.5, y))
     dx = min(abs(x - SUN[0]), 1 - abs(x - SUN[0])) * 2.9
-    colour = mix(colour, (1.0, 0.90, 0.68), math.exp(-math.hypot(dx, y - SUN[1]) * 4.5))
+    color = mix(color, (1.0, 0.90, 0.68), math.exp(-math.hypot(dx, y - SUN[1]) * 4.5))
     cover = smooth(0.10, 0.95, clouds(x, y * 0.9) + 0.35 - 0.4 * y)
     lit = 0.78 + 0.2 * (clouds(x + 0.004, y * 0.9 - 0.02) - clouds(x, y * 0.9)) * 4
-    return mix(colour, (min(1, lit * 1.04), min(1, lit), min(1, lit * 0.97)), cover * 0.9)
+    return mix(color, (min(1, lit * 1.04), min(1, lit), min(1, lit * 0.97)), cover * 0.9)
 
 
 def mountains(rng):
-    """Ranges from far to near: (outline, colour in the light, colour in the shade, haze)."""
+    """Ranges from far to near: (outline, color in the light, color in the shade, haze)."""
     return [
         (ridge_line(rng, 0.44, 0.17, (3, 5, 8, 13, 21, 34, 55), 0.9), (0.72, 0.76, 0.80), (0.47, 0.54, 0.62), 0.45),
         (ridge_line(rng, 0.52, 0.13, (2, 5, 9, 15, 27, 44, 71), 0.8), (0.62, 0.62, 0.58), (0.28, 0.33, 0.38), 0.22),
@@ -86,11 +86,11 @@ def mountains(rng):
 
 
 def land_column(i, height, ranges, clouds, rock):
-    """The colours of one column down to the shore."""
+    """The colors of one column down to the shore."""
     x, column = i / WIDTH, []
     for j in range(round(height * SHORE)):
         y = j / height
-        colour = sky(x, y, clouds)
+        color = sky(x, y, clouds)
         for line, light, shade, haze in ranges:
             depth = y - line[i]
             if depth < -1.0 / height:
@@ -101,8 +101,8 @@ def land_column(i, height, ranges, clouds, rock):
             if light[2] > 0.55:  # snow on the high ranges
                 face = mix(face, (0.97, 0.97, 0.98), smooth(0.02, -0.05, y - 0.38 - 0.12 * relief) * (0.7 + 0.3 * relief))
             face = mix(face, (0.80, 0.82, 0.80), haze + 0.35 * smooth(0.05, 0.25, depth))
-            colour = mix(colour, face, (depth * height + 1) / 1.5)
-        column.append(colour)
+            color = mix(color, face, (depth * height + 1) / 1.5)
+        column.append(color)
     return column
 
 
@@ -150,14 +150,14 @@ def draw_firs(canvas, top, height, rng):
             continue  # the clearing where the boat sails
         tall = rng.uniform(0.05, 0.15) * height * (1.2 if x / WIDTH > 0.8 or x / WIDTH < 0.12 else 0.8)
         tone = rng.uniform(0.03, 0.17)
-        colour = (tone, tone * 1.25, tone * 1.05)
+        color = (tone, tone * 1.25, tone * 1.05)
         base = shore + rng.uniform(-1, 3)
-        canvas.line([(x, base), (x, base - tall)], 1.2, colour)
+        canvas.line([(x, base), (x, base - tall)], 1.2, color)
         tiers = max(4, int(tall / 4))
         for tier in range(tiers):
             y = base - tall * (0.12 + 0.86 * tier / tiers)
             reach = tall * 0.24 * (1 - tier / tiers) + 0.8
-            canvas.polygon([(x - reach, y + 1.5), (x, y - tall / tiers * 1.3), (x + reach, y + 1.5)], colour, 0.9)
+            canvas.polygon([(x - reach, y + 1.5), (x, y - tall / tiers * 1.3), (x + reach, y + 1.5)], color, 0.9)
 
 
 def draw_boat(canvas, top, height):
@@ -212,8 +212,8 @@ def draw_bowl(canvas, rng):
     first = top + title
     for j in range(height):
         row = [column[j] for column in columns] if j < round(height * SHORE) else lake_row(j / height, columns, height, ripple)
-        for i, colour in enumerate(row):
-            canvas.blend(i, first + j, colour, 1)
+        for i, color in enumerate(row):
+            canvas.blend(i, first + j, color, 1)
     draw_moon(canvas, first, height, rng)
     draw_firs(canvas, first, height, rng)
     draw_boat(canvas, first, height)
@@ -248,7 +248,7 @@ def draw_inner(canvas):
 
 
 def hilbert_points(order):
-    """Centres of the 4^order squares of the unit square, along the Hilbert curve."""
+    """Centers of the 4^order squares of the unit square, along the Hilbert curve."""
     points = [(0, 0)]
     for level in range(order):
         n = 1 << level

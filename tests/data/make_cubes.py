@@ -3,11 +3,11 @@
 
 letter_cube.{wrl,obj,mtl,ply}, letter_cube.png
     A cube of 20 mm with a letter F and the face's number, 1 to 6, on each face: 1 front, 2 right, 3 back, 4 left, 5 top, 6 bottom. The same
-    cube in three formats, each by its own rules: VRML (metres, y up), OBJ (here millimetres, y up), PLY (millimetres, z up, texture
+    cube in three formats, each by its own rules: VRML (meters, y up), OBJ (here millimeters, y up), PLY (millimeters, z up, texture
     coordinates per vertex and the image named by a TextureFile comment, as MeshLab writes them). In all of them texture coordinates start
     at the image's lower left corner.
-face_colors.wrl      a cube of 20 mm, each face in a grey of its own (colorPerVertex FALSE with colorIndex)
-vertex_colors.wrl    a plate whose corners are black and white (colour per vertex, no colorIndex)
+face_colors.wrl      a cube of 20 mm, each face in a gray of its own (colorPerVertex FALSE with colorIndex)
+vertex_colors.wrl    a plate whose corners are black and white (color per vertex, no colorIndex)
 vertex_colors.ply    the same plate
 
 Standard library only."""
@@ -74,7 +74,7 @@ def cube_vrml():
     index = "\n      ".join(" ".join(str(vertices.index(corner_position(f, c, SIDE_MM / 2000))) for c in CORNERS) + " -1" for f in range(6))
     uv_index = "\n      ".join(" ".join(str(4 * f + k) for k in range(4)) + " -1" for f in range(6))
     return f"""#VRML V2.0 utf8
-# A cube with a letter on each face. Made by tests/data/make_cubes.py. Metres, y up.
+# A cube with a letter on each face. Made by tests/data/make_cubes.py. Meters, y up.
 Shape {{
   appearance Appearance {{ texture ImageTexture {{ url "letter_cube.png" }} }}
   geometry IndexedFaceSet {{
@@ -97,7 +97,7 @@ Shape {{
 
 def cube_obj():
     vertices = cube_vertices(SIDE_MM / 2)
-    lines = ["# A cube with a letter on each face. Made by tests/data/make_cubes.py. Millimetres, y up.", "mtllib letter_cube.mtl", "usemtl letters"]
+    lines = ["# A cube with a letter on each face. Made by tests/data/make_cubes.py. Millimeters, y up.", "mtllib letter_cube.mtl", "usemtl letters"]
     lines += ["v " + text_of(p) for p in vertices]
     lines += ["vt " + text_of(texture_coordinate(f, c)) for f in range(6) for c in CORNERS]
     for f in range(6):
@@ -116,7 +116,7 @@ def cube_ply():
             x, y, z = corner_position(f, c, SIDE_MM / 2)
             rows.append(text_of((x, -z, y) + texture_coordinate(f, c)))  # y up to z up
         faces.append("4 " + " ".join(str(4 * f + k) for k in range(4)))
-    header = ["ply", "format ascii 1.0", "comment A cube with a letter on each face. Made by tests/data/make_cubes.py. Millimetres, z up.",
+    header = ["ply", "format ascii 1.0", "comment A cube with a letter on each face. Made by tests/data/make_cubes.py. Millimeters, z up.",
               "comment TextureFile letter_cube.png", f"element vertex {len(rows)}"]
     header += [f"property float {name}" for name in ("x", "y", "z", "s", "t")]
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
@@ -128,7 +128,7 @@ def face_colors_vrml():
     points = ",\n      ".join(text_of(p) for p in vertices)
     index = "\n      ".join(" ".join(str(vertices.index(corner_position(f, c, SIDE_MM / 2000))) for c in CORNERS) + " -1" for f in range(6))
     return f"""#VRML V2.0 utf8
-# A cube, each face in a grey of its own. Made by tests/data/make_cubes.py. Metres, y up.
+# A cube, each face in a gray of its own. Made by tests/data/make_cubes.py. Meters, y up.
 Shape {{
   geometry IndexedFaceSet {{
     colorPerVertex FALSE
@@ -146,16 +146,16 @@ Shape {{
 
 
 PLATE = [(-15, 0), (15, 0), (15, 20), (-15, 20)]  # mm; black at the left, white at the right
-PLATE_GREY = [0, 1, 1, 0]
+PLATE_Gray = [0, 1, 1, 0]
 
 
 def vertex_colors_vrml():
     return f"""#VRML V2.0 utf8
-# A plate from black to white, colours per vertex. Made by tests/data/make_cubes.py. Metres, y up.
+# A plate from black to white, colors per vertex. Made by tests/data/make_cubes.py. Meters, y up.
 Shape {{
   geometry IndexedFaceSet {{
     solid FALSE
-    color Color {{ color [ {", ".join(text_of([g] * 3) for g in PLATE_GREY)} ] }}
+    color Color {{ color [ {", ".join(text_of([g] * 3) for g in PLATE_Gray)} ] }}
     coord Coordinate {{ point [ {", ".join(text_of((x / 1000, y / 1000, 0)) for x, y in PLATE)} ] }}
     coordIndex [ 0 1 2 3 -1 ]
   }}
@@ -164,11 +164,11 @@ Shape {{
 
 
 def vertex_colors_ply():
-    header = ["ply", "format ascii 1.0", "comment A plate from black to white. Made by tests/data/make_cubes.py. Millimetres, z up.",
+    header = ["ply", "format ascii 1.0", "comment A plate from black to white. Made by tests/data/make_cubes.py. Millimeters, z up.",
               "element vertex 4", "property float x", "property float y", "property float z"]
     header += [f"property uchar {name}" for name in ("red", "green", "blue")]
     header += ["element face 1", "property list uchar int vertex_indices", "end_header"]
-    rows = [f"{x} 0 {y} " + " ".join([str(255 * g)] * 3) for (x, y), g in zip(PLATE, PLATE_GREY)]
+    rows = [f"{x} 0 {y} " + " ".join([str(255 * g)] * 3) for (x, y), g in zip(PLATE, PLATE_Gray)]
     return "\n".join(header + rows + ["4 0 1 2 3"]) + "\n"
 
 

@@ -4,7 +4,7 @@
     make_eggcup.py           writes the three files beside this script
     make_eggcup.py --check   exits with 1 if they are not what this script makes
 
-The cup is a closed surface of revolution with wall thickness, 60 mm high, in metres with y up as VRML has it. Standard library only."""
+The cup is a closed surface of revolution with wall thickness, 60 mm high, in meters with y up as VRML has it. Standard library only."""
 
 import math
 import os
@@ -146,7 +146,7 @@ def _intern(values, index, value):
 
 
 def number(value):
-    """Six decimals at most: micrometres."""
+    """Six decimals at most: micrometers."""
     text = f"{value:.6f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
 
@@ -180,7 +180,7 @@ def face(corners, which):
 
 def vrml(mesh, title):
     return f"""#VRML V2.0 utf8
-# {title}. Made by tests/data/make_eggcup.py. Metres, y up.
+# {title}. Made by tests/data/make_eggcup.py. Meters, y up.
 WorldInfo {{ title "{title}" }}
 Viewpoint {{ position 0 .05 .2 description "front" }}
 Shape {{

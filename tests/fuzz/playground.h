@@ -80,7 +80,7 @@ inline std::string tiff() {
   for (const auto& [tag, type, value] : tags) out += little(tag, 2) + little(type, 2) + little(1, 4) + little(value, 4);
   return out + little(0, 4) + pixels();
 }
-/// Two colours, 2 x 2, one code a pixel.
+/// Two colors, 2 x 2, one code a pixel.
 inline std::string gif() {
   return std::string("GIF89a") + little(2, 2) + little(2, 2) + std::string("\x80\0\0", 3) +
          std::string("\0\0\0\xff\xff\xff", 6) + "," + little(0, 4) + little(2, 2) + little(2, 2) +

@@ -241,8 +241,8 @@ TEST(OrientationTest, WouldSeeEveryOtherWay) {
   }
 }
 
-TEST(Colors, EachFaceIsPaintedInItsOwnGrey) {
-  // face_colors.wrl: colorIndex [3 1 4 0 2 5] of the greys 0, .2, .4, .6, .8, 1, sRGB-encoded, for the faces in the
+TEST(Colors, EachFaceIsPaintedInItsOwnGray) {
+  // face_colors.wrl: colorIndex [3 1 4 0 2 5] of the grays 0, .2, .4, .6, .8, 1, sRGB-encoded, for the faces in the
   // order above.
   JobSettings settings;
   settings.size_mm = kSide_m * 1e3;
@@ -252,7 +252,7 @@ TEST(Colors, EachFaceIsPaintedInItsOwnGrey) {
   const TexturedMesh box = plain_box(Eigen::Vector3d::Constant(kSide_m));
   Film film(box, painting.cell, painting.program.pitch_m);
   film.expose(painting.emissions);
-  const std::array<double, 6> greys{.6, .2, .8, 0, .4, 1};
+  const std::array<double, 6> grays{.6, .2, .8, 0, .4, 1};
   for (std::size_t k = 0; k + 1 < kFaces.size(); ++k) {  // the last one is the bottom
     const Bitmap bitmap = read_face(film, placed.R_OF * kFaces[k].normal_F, placed.R_OF * kFaces[k].right_F,
                                     placed.R_OF * kFaces[k].up_F);
@@ -261,7 +261,7 @@ TEST(Colors, EachFaceIsPaintedInItsOwnGrey) {
     for (int row = 6; row < kGrid - 6; ++row)
       for (int column = 6; column < kGrid - 6; ++column)
         sum += bitmap[static_cast<std::size_t>(row * kGrid + column)], ++count;
-    const double linear = greys[k] <= .04045 ? greys[k] / 12.92 : std::pow((greys[k] + .055) / 1.055, 2.4);
+    const double linear = grays[k] <= .04045 ? grays[k] / 12.92 : std::pow((grays[k] + .055) / 1.055, 2.4);
     EXPECT_NEAR(sum / count, 1 - linear, .08) << kFaces[k].name;
   }
 }

@@ -57,11 +57,11 @@ TEST(PaintedDots, OrderOfEmissionsDoesNotMatter) {
 
 TEST(PaintedDots, AxesRestBesideTheirTargets) {
   PaintedProgram painted(500);
-  // A second exposure a millimetre aside of each: the nearest one is meant.
+  // A second exposure a millimeter aside of each: the nearest one is meant.
   for (std::size_t i = 0; i < 500; ++i) {
-    Exposure neighbour = painted.program.exposures[i];
-    neighbour.joints[kRotation] += 4e-4;
-    painted.program.exposures.push_back(neighbour);
+    Exposure neighbor = painted.program.exposures[i];
+    neighbor.joints[kRotation] += 4e-4;
+    painted.program.exposures.push_back(neighbor);
   }
   std::mt19937 random(kSeed);
   std::uniform_real_distribution<double> share(-1, 1);

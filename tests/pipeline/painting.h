@@ -35,7 +35,7 @@ struct FileToObject {
 };
 FileToObject file_to_object(const std::filesystem::path& model, const JobSettings& settings);
 
-/// A box standing on z = 0, centred on the z axis; no texture. Triangles 2k and 2k + 1 are face k: +x, -x, +y, -y, +z,
+/// A box standing on z = 0, centered on the z axis; no texture. Triangles 2k and 2k + 1 are face k: +x, -x, +y, -y, +z,
 /// -z.
 TexturedMesh plain_box(const Eigen::Vector3d& size_m);
 

@@ -46,7 +46,7 @@ std::size_t count_of(const Picture& picture, const std::array<std::uint8_t, 3>& 
   return count;
 }
 
-TEST(PlanningPictures, SkippedDotsHaveTheColourOfTheirReason) {
+TEST(PlanningPictures, SkippedDotsHaveTheColorOfTheirReason) {
   constexpr std::size_t kSkipped = 100;
   for (const SkipReason reason : {SkipReason::kOccluded, SkipReason::kJointLimit, SkipReason::kNoWay}) {
     const PlannedPlate some(kSkipped, reason), none(0, reason);

@@ -11,7 +11,7 @@ namespace hilbrush::testing_pipeline {
 
 struct RandomWork {
   CellDescription cell;
-  TexturedMesh mesh;  ///< standing on z = 0, centred, black; may need repair
+  TexturedMesh mesh;  ///< standing on z = 0, centered, black; may need repair
   PlanOptions options;
   std::uint64_t dot_count = 0;
   std::string shape;  ///< what kind of mesh

@@ -138,7 +138,7 @@ TEST(WholePath, RefusalsNameWhatToChange) {
   const std::string size = refusal({test_data("letter_cube.obj"), no_size, cell, folder.path()});
   EXPECT_NE(size.find("size"), std::string::npos) << size;
   EXPECT_NE(size.find("units"), std::string::npos) << size;
-  EXPECT_EQ(refusal({test_data("letter_cube.wrl"), no_size, cell, folder.path()}), "") << "VRML files are in metres";
+  EXPECT_EQ(refusal({test_data("letter_cube.wrl"), no_size, cell, folder.path()}), "") << "VRML files are in meters";
   EXPECT_NE(
       refusal({test_data("no_such_model.wrl"), settings_of(20, 80), cell, folder.path()}).find("no_such_model.wrl"),
       std::string::npos);

@@ -42,7 +42,7 @@ inline void add_quad(TexturedMesh& mesh, const std::array<Eigen::Vector3d, 4>& c
   if (mesh.materials.empty()) mesh.materials.push_back({.name = "paint", .source = ColorSource::kColors});
 }
 
-/// A square of side `size` in the plane z = height, centred on the axis, facing up.
+/// A square of side `size` in the plane z = height, centered on the axis, facing up.
 inline TexturedMesh square(double size, double height = 0, float luminance = 0) {
   TexturedMesh mesh;
   const double r = size / 2;

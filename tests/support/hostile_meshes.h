@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-/// Meshes that break samplers, by name: each stands for one repair or one way of cutting and mapping. Metres.
+/// Meshes that break samplers, by name: each stands for one repair or one way of cutting and mapping. Meters.
 namespace hilbrush::test {
 
 /// Two squares that touch in a corner.

@@ -11,7 +11,7 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// Meshes that tests ask for by name: plain ones, and awkward ones. Metres; about 50 mm large.
+/// Meshes that tests ask for by name: plain ones, and awkward ones. Meters; about 50 mm large.
 namespace hilbrush::test {
 
 inline constexpr double kPi = std::numbers::pi;

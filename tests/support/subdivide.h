@@ -26,7 +26,7 @@ inline void halve_side(TexturedMesh& mesh, TriangleSide at, std::uint32_t middle
 }
 
 /// Halves the longest edges, round by round, until there are `triangle_count` triangles (or one more); the surface and
-/// its colours stay as they are. Edges are those between vertex indices: weld the mesh before. Numbered as a mesh of
+/// its colors stay as they are. Edges are those between vertex indices: weld the mesh before. Numbered as a mesh of
 /// that size from a file would be.
 inline TexturedMesh subdivided(TexturedMesh mesh, std::size_t triangle_count) {
   while (mesh.triangles.size() < triangle_count) {

@@ -61,7 +61,7 @@ TEST_P(LightProgram, LinksNothingHeavy) {
 INSTANTIATE_TEST_SUITE_P(Programs, LightProgram,
                          testing::Values("hilbrush", "hilbrushd", "hilbrush-laserguard", "hilbrush-simcell"));
 
-TEST(HeavyProgram, IsRecognised) {
+TEST(HeavyProgram, IsRecognized) {
   // The same reading finds the image library where it is linked: the test above can fail.
   if (find_program("readelf").empty()) GTEST_SKIP() << "SKIPPED: readelf (package binutils) is not installed";
   const std::set<std::string> needed = needed_libraries(program("hilbrush-pipeline"));

@@ -99,7 +99,7 @@ class DotsSet : public MeasuredSet {
                                       std::pair{request.points, "$.points"}})
       if (!value.empty()) throw InputError(path, "is of no use with dots that are placed already");
     if (!request.counts.empty()) throw InputError("$.count", "is of no use with dots that are placed already");
-    put_on_surface();
+    project_to_surface();
     notes.emplace_back(
         "dots are held against the wanted tone after the tone curve: shares by asked tone times area, "
         "lengths over the local pitch");
@@ -124,7 +124,7 @@ class DotsSet : public MeasuredSet {
   }
 
   /// Gives the dots back their triangles, and refuses a model that they do not lie on.
-  void put_on_surface() {
+  void project_to_surface() {
     const auto box = bounds(mesh_);
     const double far = 1e-3 * (box[1] - box[0]).norm();
     std::size_t astray = 0;

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-constexpr std::size_t kMostShown = 30'000;  ///< dots in a picture: more make one black and the file large
+constexpr std::size_t kMaxShown = 30'000;  ///< dots in a picture: more make one black and the file large
 
 Plot discrepancy_plot(const std::string& title, const std::vector<SizedFigures>& sizes) {
   Plot plot{"Discrepancy: " + title, "dots", "rms error of the test shapes' shares", true, true, {}, {}, {}};
@@ -65,14 +65,14 @@ Plot anisotropy_plot(const std::string& title, const Spectrum& spectrum) {
   return plot;
 }
 
-Plot neighbour_plot(const std::string& title, const Spacing& spacing) {
+Plot neighbor_plot(const std::string& title, const Spacing& spacing) {
   constexpr std::size_t kBars = 60;
   const double step = 1.2 / kBars;
   std::vector<double> shares(kBars, 0.);
   for (const double distance : spacing.distances)
     if (const auto bar = static_cast<std::size_t>(distance / step); bar < kBars)
       shares[bar] += 1 / static_cast<double>(spacing.distances.size());
-  Plot plot{"Nearest neighbours: " + title,
+  Plot plot{"Nearest neighbors: " + title,
             "distance over that of the densest packing",
             "share of the dots",
             false,
@@ -126,8 +126,8 @@ std::vector<std::string> write_plots(const std::string& title, const std::vector
     write("anisotropy.svg", svg_of(anisotropy_plot(with_count, *figures.spectrum)));
   }
   if (figures.spacing && !figures.spacing->distances.empty())
-    write("neighbours.svg", svg_of(neighbour_plot(with_count, *figures.spacing)));
-  if (figures.count <= kMostShown) {
+    write("neighbors.svg", svg_of(neighbor_plot(with_count, *figures.spacing)));
+  if (figures.count <= kMaxShown) {
     const PointPicture picture = picture_of(last);
     write("dots.svg", svg_of(std::span(&picture, 1), with_count));
   }

@@ -7,7 +7,7 @@
 
 namespace hilbrush {
 
-/// Writes what there is to show: discrepancy over the count, spectrum, directions, distances between neighbours, and
+/// Writes what there is to show: discrepancy over the count, spectrum, directions, distances between neighbors, and
 /// the dots themselves. Returns the files' names.
 std::vector<std::string> write_plots(const std::string& title, const std::vector<SizedFigures>& sizes,
                                      const MeasuredDots& last, const std::filesystem::path& output);

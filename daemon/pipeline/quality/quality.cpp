@@ -15,8 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint64_t kMostMeasuredDots = 20'000'000;
-constexpr std::size_t kMostCounts = 64;
+constexpr std::uint64_t kMaxMeasuredDots = 20'000'000;
+constexpr std::size_t kMaxCounts = 64;
 
 Json json_of(const QualityRequest& request, const MeasuredSet& set) {
   Json json{{"kind", set.kind}, {"set", std::filesystem::path(request.set).filename().string()}};
@@ -80,7 +80,7 @@ QualityRequest quality_request_from_json(const std::string& text) {
     request.seed = json.optional_integer("seed", 0, ~std::uint64_t{0} >> 1).value_or(1);
     request.shapes = json.optional_integer("shapes", 1, 1'000'000).value_or(1000);
     if (json.has("count"))
-      for (const double count : json.numbers("count", 1, kMostCounts, {1, static_cast<double>(kMostMeasuredDots)}))
+      for (const double count : json.numbers("count", 1, kMaxCounts, {1, static_cast<double>(kMaxMeasuredDots)}))
         request.counts.push_back(static_cast<std::uint64_t>(count));
   });
   return request;

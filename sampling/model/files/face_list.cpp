@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 
 constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
 /// Beyond this, squares and volumes of coordinates leave the range of numbers.
-constexpr double kLargestCoordinate = 1e30;
+constexpr double kMaxCoordinate = 1e30;
 
 double linear_of_srgb(double encoded) {
   const double c = std::clamp(encoded, 0., 1.);
@@ -22,7 +22,7 @@ double linear_of_srgb(double encoded) {
 }
 
 bool is_usable(const Vector3d& p) {
-  return p.allFinite() && p.cwiseAbs().maxCoeff() < kLargestCoordinate;
+  return p.allFinite() && p.cwiseAbs().maxCoeff() < kMaxCoordinate;
 }
 
 }  // namespace

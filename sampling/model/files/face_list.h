@@ -19,7 +19,7 @@ struct FaceList {
   std::vector<std::uint32_t> corners;      ///< indices into points, face after face
   std::vector<std::size_t> face_ends;      ///< of each face: one past its last corner
   std::vector<Eigen::Vector2d> corner_uv;  ///< of each corner, or empty
-  std::vector<float> corner_luminance;     ///< linear, of each corner, or empty: no colours of its own
+  std::vector<float> corner_luminance;     ///< linear, of each corner, or empty: no colors of its own
   bool is_reversed = false;                ///< the faces run clockwise seen from outside
   bool maps_bounding_box = false;          ///< without corner_uv: VRML's default mapping over the bounding box
   std::string at;                          ///< "file:line", for messages
@@ -27,9 +27,9 @@ struct FaceList {
   void end_face() { face_ends.push_back(corners.size()); }
 };
 
-/// How a shape looks, apart from its own colours.
+/// How a shape looks, apart from its own colors.
 struct Look {
-  ColorSource source = ColorSource::kNone;  ///< kNone or kMaterial; colours and texture are added by MeshBuilder
+  ColorSource source = ColorSource::kNone;  ///< kNone or kMaterial; colors and texture are added by MeshBuilder
   float luminance = 1;                      ///< linear, of the material
   double opacity = 1;
   int texture = -1;
@@ -74,7 +74,7 @@ class MeshBuilder {
 std::vector<Eigen::Vector2d> bounding_box_mapping(const std::vector<Eigen::Vector3d>& points,
                                                   const std::vector<std::uint32_t>& corners);
 
-/// sRGB-encoded colour, channels 0..1 (clamped), to linear-light Rec. 709 luminance.
+/// sRGB-encoded color, channels 0..1 (clamped), to linear-light Rec. 709 luminance.
 float luminance_of_srgb(double red, double green, double blue);
 
 }  // namespace hilbrush

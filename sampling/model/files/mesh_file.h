@@ -10,18 +10,18 @@
 /// they see the bytes.
 namespace hilbrush {
 
-/// OBJ with its MTL: one texture or colour a material, colours a vertex. `text` is the whole file, `name` what messages
+/// OBJ with its MTL: one texture or color a material, colors a vertex. `text` is the whole file, `name` what messages
 /// call it.
 /// @throws InputError "name:line" or "name" if nothing usable is in it or a limit is exceeded; so do the others.
 Model load_obj(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
                const ModelLimits& limits);
 
 /// PLY, ASCII and binary: texture coordinates a vertex (u v, s t, texture_u texture_v) or a face corner (a list named
-/// texcoord), the image of "comment TextureFile", colours a vertex or a face.
+/// texcoord), the image of "comment TextureFile", colors a vertex or a face.
 Model load_ply(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
                const ModelLimits& limits);
 
-/// OFF, ASCII: colours a vertex or a face.
+/// OFF, ASCII: colors a vertex or a face.
 Model load_off(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
                const ModelLimits& limits);
 

@@ -88,7 +88,7 @@ class ObjPlainer {
     }
     if (colored_count_ > 0 && colored_count_ < vertex_count_)
       plain_.warnings.push_back(name_ + ": " + std::to_string(vertex_count_ - colored_count_) + " of " +
-                                std::to_string(vertex_count_) + " points have no colour; they are white");
+                                std::to_string(vertex_count_) + " points have no color; they are white");
     plain_.has_colors = colored_count_ > 0;
     if (dropped_count_ > 0)
       plain_.warnings.push_back(at(first_dropped_) + ": " + std::to_string(dropped_count_) +
@@ -119,7 +119,7 @@ class ObjPlainer {
     }
     ((vertices_ += "v ").append(words[0]) += ' ').append(words[1]) += ' ';
     vertices_.append(words[2]);
-    // Every point gets a colour, as OpenMesh counts colours, not points.
+    // Every point gets a color, as OpenMesh counts colors, not points.
     bool is_colored = count == 6;
     for (std::size_t i = 3; i < 6 && is_colored; ++i) {
       const auto number = number_in<double>(words[i]);

@@ -61,7 +61,7 @@ Header read_header(OffLines& lines, const ModelLimits& limits) {
   return header;
 }
 
-/// Colour at the end of a line: three or four numbers, whole ones up to 255 or fractions up to 1. As three bytes; null
+/// Color at the end of a line: three or four numbers, whole ones up to 255 or fractions up to 1. As three bytes; null
 /// if there is none.
 std::optional<std::array<int, 3>> read_color(std::string_view rest) {
   std::array<double, 3> channels{};
@@ -120,7 +120,7 @@ Model load_off(std::string text, const std::string& name, ModelFolder& folder, c
     append_color(faces, color);
   }
   std::string().swap(text);
-  // Colours that no line has must not look like white ones.
+  // Colors that no line has must not look like white ones.
   const std::string color_names = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   const std::string ignored_names = "property uchar skip1\nproperty uchar skip2\nproperty uchar skip3\n";
   std::string ply = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(header.vertices) +

@@ -203,7 +203,7 @@ void check_header(const PlyHeader& header, const std::string& name, std::size_t 
     check_lists(element, name);
     std::size_t bytes = 0;
     for (const PlyProperty& p : element.properties) {
-      // OpenMesh reads coordinates and colours of these types only.
+      // OpenMesh reads coordinates and colors of these types only.
       const std::string known = known_name(p.name);
       const bool is_coordinate = known == "x" || known == "y" || known == "z" || known == "u" || known == "v" ||
                                  known == "nx" || known == "ny" || known == "nz";

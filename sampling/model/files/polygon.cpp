@@ -120,7 +120,7 @@ void PolygonCutter::cut_ears() {
     previous_[next_[corner]] = previous_[corner];
     --count;
     misses = 0;
-    // Only the two neighbours change, and a convex corner never turns reflex by cutting an ear.
+    // Only the two neighbors change, and a convex corner never turns reflex by cutting an ear.
     work_ += reflex_.size();
     std::erase_if(reflex_,
                   [&](std::size_t i) { return (i == previous_[corner] || i == next_[corner]) && !is_reflex(i); });

@@ -8,7 +8,7 @@
 namespace hilbrush {
 
 /// Takes what OpenMesh's file readers deliver as plain polygons. No connectivity is built, so nothing is split, dropped
-/// or left uninitialised; every face gets a valid handle, because the readers lose their place after a refused one.
+/// or left uninitialized; every face gets a valid handle, because the readers lose their place after a refused one.
 class PolygonImporter : public OpenMesh::IO::BaseImporter {
  public:
   using FaceHandle = OpenMesh::FaceHandle;
@@ -20,7 +20,7 @@ class PolygonImporter : public OpenMesh::IO::BaseImporter {
   PolygonImporter(std::string name, const ModelLimits& limits) : name_(std::move(name)), limits_(limits) {}
 
   /// The polygons; faces with corners that do not exist are dropped and counted in `dropped`. `luminance_otherwise` is
-  /// for what has no colour. Vertex colours go before face colours. `kept` gets the number that each kept face had.
+  /// for what has no color. Vertex colors go before face colors. `kept` gets the number that each kept face had.
   FaceList take_faces(float luminance_otherwise, std::size_t& dropped, std::vector<std::size_t>& kept);
 
   /// A face property that the file brought along, by name; null if there is none of that name and type.

@@ -43,7 +43,7 @@ FaceList elevation_grid(const Reference& node, const SurfaceParts& parts, float 
   if (parts.texture_coordinates && !has_uv)
     warnings.push_back(faces.at + ": too few texture coordinates for the ElevationGrid; the default mapping is used");
   if (parts.colors && colors.size() < colors_needed)
-    warnings.push_back(faces.at + ": too few colours for the ElevationGrid; the rest get the material's");
+    warnings.push_back(faces.at + ": too few colors for the ElevationGrid; the rest get the material's");
 
   const auto add_corner = [&](std::size_t x, std::size_t z, std::size_t quad) {
     const std::size_t point = z * columns + x;

@@ -103,7 +103,7 @@ void read_colors(const Reference& node, const Reference& colors, const Outlines&
   }
   if (missing > 0)
     warnings.push_back(faces.at + ": " + std::to_string(missing) + " of " + std::to_string(faces.corners.size()) +
-                       " corners name colours that do not exist; they get the material's");
+                       " corners name colors that do not exist; they get the material's");
 }
 
 }  // namespace

@@ -130,8 +130,8 @@ int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
     const double value = std::clamp(image[i], 0., 4294967295.);
     const auto pixel = static_cast<std::uint32_t>(value);
     const auto channel = [&](int c) { return ((pixel >> (8 * (texture.channels - 1 - c))) & 255u) / 255.; };
-    const bool is_grey = texture.channels < 3;
-    texture.luminance.push_back(luminance_of_srgb(channel(0), channel(is_grey ? 0 : 1), channel(is_grey ? 0 : 2)));
+    const bool is_gray = texture.channels < 3;
+    texture.luminance.push_back(luminance_of_srgb(channel(0), channel(is_gray ? 0 : 1), channel(is_gray ? 0 : 2)));
     if (texture.channels % 2 == 0) texture.opacity.push_back(static_cast<float>(channel(texture.channels - 1)));
   }
   pixel_count_ += texture.luminance.size();

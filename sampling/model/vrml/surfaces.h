@@ -12,7 +12,7 @@ struct SurfaceParts {
   Reference coordinates, colors, texture_coordinates;
 };
 
-/// IndexedFaceSet (6.23). Faces that use a point that does not exist are dropped with a warning; colours and texture
+/// IndexedFaceSet (6.23). Faces that use a point that does not exist are dropped with a warning; colors and texture
 /// coordinates that do not exist fall back to `otherwise` and to the default mapping.
 FaceList indexed_face_set(const Reference& node, const SurfaceParts& parts, float otherwise,
                           std::vector<std::string>& warnings);
@@ -24,7 +24,7 @@ FaceList elevation_grid(const Reference& node, const SurfaceParts& parts, float 
 /// Extrusion (6.18). @throws InputError if cross-section times spine exceeds `limits.triangles`.
 FaceList extrusion(const Reference& node, const ModelLimits& limits);
 
-/// Pieces that VRML 1.0 shares: the triples of a list of numbers, and the luminances of a list of colours.
+/// Pieces that VRML 1.0 shares: the triples of a list of numbers, and the luminances of a list of colors.
 std::vector<Eigen::Vector3d> points_of(const std::vector<double>& numbers);
 std::vector<float> luminances_of(const std::vector<double>& numbers);
 

@@ -28,7 +28,7 @@ bool is_group(const std::string& type) {
   return type == "Group" || type == "Separator" || type == "TransformSeparator" || type == "WWWAnchor";
 }
 
-/// VRML 1.0, Texture2Transform: scaled and turned about the centre, then moved.
+/// VRML 1.0, Texture2Transform: scaled and turned about the center, then moved.
 Eigen::Affine2d vrml1_texture_transform(const Reference& node) {
   const Vector2d center = vector2_of(node, "center", Vector2d::Zero());
   return Eigen::Translation2d(vector2_of(node, "translation", Vector2d::Zero()) + center) *
@@ -188,7 +188,7 @@ class Vrml1Walker {
     if (!faces.face_ends.empty()) reading_.builder.add(faces, state.place.X, look);
   }
 
-  /// A VRML 2.0 face set of the same numbers: only where they stand and how colours are bound differ.
+  /// A VRML 2.0 face set of the same numbers: only where they stand and how colors are bound differ.
   FaceList face_set(const Reference& node, const State& state) {
     reading_.spend(numbers_of(node, "coordIndex").size(), *node.node);
     if (state.coordinates) reading_.spend(numbers_of(state.coordinates, "point").size(), *node.node);

@@ -367,7 +367,7 @@ TEST(ServerJobsTest, BadOrdersAreRefusedWithTheirPlace) {
   EXPECT_EQ(refusal({{"model", "/tmp"}}).at("code"), kRpcBadInput) << "a folder";
   const auto model = world.model("cup.wrl").string();
   EXPECT_EQ(refusal({{"model", model}, {"settings", {{"size_mm", -3}}}}).at("code"), kRpcBadInput);
-  EXPECT_NE(refusal({{"model", model}, {"settings", {{"colour", "red"}}}}).dump().find("colour"), std::string::npos);
+  EXPECT_NE(refusal({{"model", model}, {"settings", {{"color", "red"}}}}).dump().find("color"), std::string::npos);
   EXPECT_EQ(refusal({{"model", model}, {"settings", {{"size_mm", 80}, {"cell", "../../etc/passwd"}}}}).at("code"),
             kRpcBadInput);
   EXPECT_EQ(refusal({{"model", model}, {"modle", 1}}).at("data").at("at"), "$.modle");

@@ -317,7 +317,7 @@ TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobo
   {
     std::filesystem::create_directories(world.options.state);
     JobStore store(world.options.state / "jobs.sqlite", nullptr);
-    for (std::size_t i = 0; i < JobBook::kHistoryMax; ++i) {
+    for (std::size_t i = 0; i < JobQueue::kHistoryMax; ++i) {
       Job job;
       job.state = JobState::kDone;
       job.is_begun = true;

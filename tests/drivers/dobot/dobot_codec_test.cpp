@@ -47,7 +47,7 @@ TEST(DobotCodec, WhatIsNoReplyIsRefused) {
     EXPECT_FALSE(decode_dobot_reply(text)) << text;
 }
 
-TEST(DobotCodec, AnEchoIsRecognisedWithoutRegardToCase) {
+TEST(DobotCodec, AnEchoIsRecognizedWithoutRegardToCase) {
   EXPECT_TRUE(is_dobot_echo("jointmovj(1.0,2,3,4)", "JointMovJ(1.000000,2.000000,3.000000,4.000000)"));
   EXPECT_TRUE(is_dobot_echo("Sync()", "Sync()"));
   EXPECT_FALSE(is_dobot_echo("DO(1,0)", "Sync()"));

@@ -67,7 +67,7 @@ struct Work {
     const double j4 = joints[kJ4];
     ASSERT_TRUE(
         kinematics.solve_arm(table.to_W(plan.program.exposures[i].position_O), kinematics.yaw(joints), other, joints));
-    joints[kJ4] = kinematics.wind(kJ4, joints[kJ4], j4);
+    joints[kJ4] = kinematics.unwrap_near(kJ4, joints[kJ4], j4);
   }
 };
 

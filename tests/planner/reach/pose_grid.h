@@ -25,7 +25,7 @@ inline PoseGridAnswer search_pose_grid(const Reach::Implementation& reach, const
     for (int c = 0; c < turns; ++c) {
       const double rotation = std::remainder(c * 2 * std::numbers::pi / turns, 2 * std::numbers::pi);
       const TablePose table = kinematics.table_pose(low + (high - low) * a / tilts,
-                                                    kinematics.wind(kRotation, rotation, reference[kRotation]));
+                                                    kinematics.unwrap_near(kRotation, rotation, reference[kRotation]));
       for (int y = 0; y < turns; ++y) {
         const double yaw = y * 2 * std::numbers::pi / turns;
         const Eigen::Vector3d beam_O = table.R_WO.transpose() * kinematics.beam_W(yaw);

@@ -55,7 +55,7 @@ TEST(Blue, HasBlueNoiseInThePlane) {
   EXPECT_GE(rival.below_half, .3) << "the control";
   EXPECT_LE(spectrum.anisotropy, rival.anisotropy + .1);
   EXPECT_GE(plane_spacing(blue).smallest, .5);
-  // Centres on the border and in the corners count here, where a stratum has only one side to keep its dot from.
+  // Centers on the border and in the corners count here, where a stratum has only one side to keep its dot from.
   EXPECT_LE(plane_largest_hole(blue), 1.1);
   EXPECT_LT(plane_discrepancies(blue)[1].rms, plane_discrepancies(jittered)[1].rms);
 }

@@ -62,29 +62,29 @@ TEST(TouchingBalls, NoneAndOne) {
   EXPECT_TRUE(find_touching_balls(one, accept_odd_sums)[0].empty());
 }
 
-TEST(Colouring, StretchesOfAColourDoNotTouch) {
+TEST(Coloring, StretchesOfAColorDoNotTouch) {
   const std::vector<SizedBall> balls = random_balls(3000, 5);
   std::vector<SizedBall> along = balls;
   std::sort(along.begin(), along.end(),
             [](const SizedBall& a, const SizedBall& b) { return a.center_O.x() < b.center_O.x(); });
   for (SizedBall& ball : along) ball.radius_m = .01;
-  const IndexLists neighbours = find_touching_balls(along, [](std::uint32_t, std::uint32_t) { return true; });
-  const Colouring colouring = colour_stretches(neighbours);
-  const std::size_t stretch_count = (along.size() + Colouring::kStretch - 1) / Colouring::kStretch;
-  std::vector<std::size_t> colour_of(stretch_count, ~std::size_t{0});
-  for (std::size_t colour = 0; colour < colouring.stretches.size(); ++colour)
-    for (const std::uint32_t stretch : colouring.stretches[colour]) {
-      EXPECT_EQ(colour_of[stretch], ~std::size_t{0}) << "coloured twice";
-      colour_of[stretch] = colour;
+  const IndexLists neighbors = find_touching_balls(along, [](std::uint32_t, std::uint32_t) { return true; });
+  const Coloring coloring = color_stretches(neighbors);
+  const std::size_t stretch_count = (along.size() + Coloring::kStretch - 1) / Coloring::kStretch;
+  std::vector<std::size_t> color_of(stretch_count, ~std::size_t{0});
+  for (std::size_t color = 0; color < coloring.stretches.size(); ++color)
+    for (const std::uint32_t stretch : coloring.stretches[color]) {
+      EXPECT_EQ(color_of[stretch], ~std::size_t{0}) << "colored twice";
+      color_of[stretch] = color;
     }
   for (std::size_t i = 0; i < along.size(); ++i) {
-    ASSERT_LT(colour_of[i / Colouring::kStretch], colouring.stretches.size());
-    for (const std::uint32_t j : neighbours[i]) {
-      if (i / Colouring::kStretch == j / Colouring::kStretch) continue;
-      ASSERT_NE(colour_of[i / Colouring::kStretch], colour_of[j / Colouring::kStretch]);
+    ASSERT_LT(color_of[i / Coloring::kStretch], coloring.stretches.size());
+    for (const std::uint32_t j : neighbors[i]) {
+      if (i / Coloring::kStretch == j / Coloring::kStretch) continue;
+      ASSERT_NE(color_of[i / Coloring::kStretch], color_of[j / Coloring::kStretch]);
     }
   }
-  EXPECT_LT(colouring.stretches.size(), stretch_count);
+  EXPECT_LT(coloring.stretches.size(), stretch_count);
 }
 
 }  // namespace

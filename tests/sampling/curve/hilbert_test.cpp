@@ -44,23 +44,23 @@ std::vector<Place> expect_curve(int depth) {
   for (std::size_t i = 1; i < places.size(); ++i) {
     int steps = 0;
     for (std::size_t k = 0; k < 3; ++k) steps += std::abs(places[i][k] - places[i - 1][k]);
-    EXPECT_EQ(steps, 1) << "neighbours along the curve are neighbours in space, at " << i << " depth " << depth;
+    EXPECT_EQ(steps, 1) << "neighbors along the curve are neighbors in space, at " << i << " depth " << depth;
   }
   EXPECT_EQ(places.front(), (Place{0, 0, 0}));
   return places;
 }
 
-TEST(Hilbert, EachQuadOnceAndNeighboursAdjacent) {
+TEST(Hilbert, EachQuadOnceAndNeighborsAdjacent) {
   for (int depth = 1; depth <= 6; ++depth)
     EXPECT_EQ(expect_curve<HilbertQuad>(depth).back(), (Place{(1 << depth) - 1, 0, 0})) << "squares in a row join";
 }
 
-TEST(Hilbert, EachCubeOnceAndNeighboursAdjacent) {
+TEST(Hilbert, EachCubeOnceAndNeighborsAdjacent) {
   for (int depth = 1; depth <= 4; ++depth)
     EXPECT_EQ(expect_curve<HilbertCube>(depth).back(), (Place{(1 << depth) - 1, 0, 0}));
 }
 
-TEST(Peano, EachQuadOnceAndNeighboursAdjacent) {
+TEST(Peano, EachQuadOnceAndNeighborsAdjacent) {
   int side = 1;
   for (int depth = 1; depth <= 4; ++depth) {
     side *= 3;

@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-SampleOptions options_for(std::uint64_t count, Sampler sampler = Sampler::kCentroid) {
+SampleOptions sample_options(std::uint64_t count, Sampler sampler = Sampler::kCentroid) {
   SampleOptions options;
   options.dot_count = count;
   options.sampler = sampler;
@@ -85,7 +85,7 @@ TEST(Sample, ExactCountsOnEveryAwkwardMeshWithEverySampler) {
     const ToneField tone(mesh, {});
     for (const Sampler sampler : {Sampler::kCentroid, Sampler::kJittered, Sampler::kEven, Sampler::kRandom})
       for (const std::uint64_t count : {1, 2, 37, 1000}) {
-        const DotSequence sequence = place_dots(curve, tone, options_for(count, sampler));
+        const DotSequence sequence = place_dots(curve, tone, sample_options(count, sampler));
         ASSERT_EQ(sequence.dots.size(), count) << name;
         for (const Dot& dot : sequence.dots) {
           ASSERT_NEAR(dot.normal_O.norm(), 1, 1e-5) << name;
@@ -113,7 +113,7 @@ double worst_stratum_error(const CurveMass& mass, std::uint64_t count,
                            const std::function<double(const PatchPiece&)>& exact) {
   const double dot_mass = mass.total_m2() / static_cast<double>(count);
   std::vector<double> masses(count);
-  visit_stretches(mass, options_for(count), [&](std::uint64_t stratum, const Patch& patch, double from, double to) {
+  visit_stretches(mass, sample_options(count), [&](std::uint64_t stratum, const Patch& patch, double from, double to) {
     for (const PatchPiece& piece : patch.pieces) masses.at(stratum) += (to - from) * exact(piece);
   });
   double worst = 0;
@@ -176,7 +176,7 @@ TEST(Sample, AdaptivePatchesAreFewAndPlaceTheSameDots) {
   const SurfaceCurve curve(mesh);
   const ToneField tone(mesh, {});
   const CurveMass mass(curve, tone);
-  SampleOptions options = options_for(200'000);
+  SampleOptions options = sample_options(200'000);
   SampleReport adaptive_report, uniform_report;
   const DotSequence adaptive = place_dots(mass, options, &adaptive_report);
   options.uniform_depth = static_cast<int>(adaptive_report.patches_at_depth.size()) - 1;
@@ -196,11 +196,11 @@ TEST(Sample, StreamedDotsArePlacedDots) {
   const ToneField tone(mesh, {});
   const CurveMass mass(curve, tone);
   for (const std::uint64_t count : {1, 300, 30000}) {
-    const DotSequence all = place_dots(mass, options_for(count));
+    const DotSequence all = place_dots(mass, sample_options(count));
     SampleReport report;
     std::size_t i = 0;
     stream_dots(
-        mass, options_for(count),
+        mass, sample_options(count),
         [&](std::span<const Dot> dots) {
           for (const Dot& dot : dots) ASSERT_EQ(dot.position_O, all.dots.at(i++).position_O);
         },
@@ -210,12 +210,12 @@ TEST(Sample, StreamedDotsArePlacedDots) {
     EXPECT_NEAR(report.components.at(0).path_length_m, report.path_length_m, 1e-12);
   }
   const auto stops = [](std::span<const Dot>) { throw InputError("", "enough"); };
-  EXPECT_THROW(stream_dots(mass, options_for(300000), stops), InputError);
+  EXPECT_THROW(stream_dots(mass, sample_options(300000), stops), InputError);
 }
 
 TEST(Sample, DotsFollowTheTone) {
   const TexturedMesh mesh = ramp();
-  const DotSequence sequence = sample(mesh, options_for(20000));
+  const DotSequence sequence = sample(mesh, sample_options(20000));
   std::array<double, 10> counts{};
   for (const Dot& dot : sequence.dots) counts[static_cast<std::size_t>(std::min(9., dot.position_O.x() / .004))] += 1;
   for (std::size_t k = 0; k < 10; ++k) {
@@ -230,13 +230,14 @@ TEST(Sample, PitchAndCountSayTheSame) {
   options.pitch_m = .000254;
   const DotSequence by_pitch = sample(mesh, options);
   EXPECT_EQ(by_pitch.dots.size(), static_cast<std::size_t>(std::lround(mesh.area_m2() / (.000254 * .000254))));
-  EXPECT_NEAR(sample(mesh, options_for(by_pitch.dots.size())).pitch_m, .000254, 1e-8);
+  EXPECT_NEAR(sample(mesh, sample_options(by_pitch.dots.size())).pitch_m, .000254, 1e-8);
 }
 
 TEST(Sample, NoLongJumpsOnMappedSurfaces) {
   for (const char* name : {"sphere", "cube", "long strip", "needle cylinder"}) {
     SampleReport report;
-    const DotSequence sequence = sample(repair_mesh(test::awkward_meshes().at(name)).mesh, options_for(8000), &report);
+    const DotSequence sequence =
+        sample(repair_mesh(test::awkward_meshes().at(name)).mesh, sample_options(8000), &report);
     EXPECT_LT(largest_jump(sequence), 5) << name;
     EXPECT_LT(report.path_constant, 1.1) << name;
   }
@@ -249,7 +250,7 @@ TEST(Sample, SameBytesForAnyNumberOfThreads) {
     std::vector<DotSequence> results;
     for (const std::size_t threads : {1, 2, 5}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-      results.push_back(sample(mesh, options_for(5000, sampler)));
+      results.push_back(sample(mesh, sample_options(5000, sampler)));
     }
     for (const DotSequence& other : results)
       for (std::size_t i = 0; i < 5000; ++i) {
@@ -261,7 +262,7 @@ TEST(Sample, SameBytesForAnyNumberOfThreads) {
 
 TEST(Sample, SeedsDiffer) {
   const TexturedMesh mesh = test::sphere(.02);
-  SampleOptions options = options_for(500, Sampler::kJittered);
+  SampleOptions options = sample_options(500, Sampler::kJittered);
   const DotSequence one = sample(mesh, options);
   options.seed = 2;
   const DotSequence two = sample(mesh, options);
@@ -271,12 +272,12 @@ TEST(Sample, SeedsDiffer) {
 }
 
 TEST(Sample, BlankSurfaceGetsNoDots) {
-  // Black bars, one texel in eight: hardly a stratum's centre lies on one by itself.
+  // Black bars, one texel in eight: hardly a stratum's center lies on one by itself.
   const TexturedMesh mesh = test::with_texture(
       test::rectangle(.04, .04, 3, 3), 64, 64, [](int i, int) { return i % 8 == 3 ? 0. : 1.; }, false, false);
   for (const Sampler sampler : {Sampler::kCentroid, Sampler::kJittered, Sampler::kEven, Sampler::kRandom})
     for (const std::uint64_t count : {50, 700, 20000}) {
-      const DotSequence sequence = sample(mesh, options_for(count, sampler));
+      const DotSequence sequence = sample(mesh, sample_options(count, sampler));
       std::size_t blank = 0;
       for (const Dot& dot : sequence.dots) blank += dot.tone <= 0;
       EXPECT_EQ(blank, 0u) << count << " dots, sampler " << static_cast<int>(sampler);
@@ -284,8 +285,8 @@ TEST(Sample, BlankSurfaceGetsNoDots) {
 }
 
 TEST(Sample, NeedlesPaintAsWellAsEvenTriangles) {
-  const auto needles = nearest_distances(sample(test::needle_cylinder(), options_for(10000)));
-  const auto even = nearest_distances(sample(test::even_cylinder(), options_for(10000)));
+  const auto needles = nearest_distances(sample(test::needle_cylinder(), sample_options(10000)));
+  const auto even = nearest_distances(sample(test::even_cylinder(), sample_options(10000)));
   EXPECT_NEAR(mean(needles), mean(even), .02);
   // The even one happens to lie on a grid.
   EXPECT_NEAR(needles[100], even[100], .16) << "the nearest percent";
@@ -294,9 +295,9 @@ TEST(Sample, NeedlesPaintAsWellAsEvenTriangles) {
 
 TEST(Sample, CentroidsSpreadBetterThanJitterAndJitterThanRandom) {
   const TexturedMesh mesh = test::rectangle(.05, .05, 7, 7);
-  const auto centroid = nearest_distances(sample(mesh, options_for(6000, Sampler::kCentroid)));
-  const auto jittered = nearest_distances(sample(mesh, options_for(6000, Sampler::kJittered)));
-  const auto random = nearest_distances(sample(mesh, options_for(6000, Sampler::kRandom)));
+  const auto centroid = nearest_distances(sample(mesh, sample_options(6000, Sampler::kCentroid)));
+  const auto jittered = nearest_distances(sample(mesh, sample_options(6000, Sampler::kJittered)));
+  const auto random = nearest_distances(sample(mesh, sample_options(6000, Sampler::kRandom)));
   EXPECT_GT(mean(centroid), .78);
   EXPECT_GT(mean(centroid), mean(jittered) + .15);
   EXPECT_NEAR(mean(random), .5, .02) << "of a Poisson process";
@@ -308,15 +309,15 @@ TEST(Sample, RefusesWhatItCannotDo) {
   const TexturedMesh white = test::finish(test::sphere(.02));
   TexturedMesh blank = white;
   for (auto& corners : blank.corner_luminance) corners.fill(1);
-  EXPECT_THROW(sample(blank, options_for(100)), InputError);
+  EXPECT_THROW(sample(blank, sample_options(100)), InputError);
   SampleOptions by_pitch;
   by_pitch.pitch_m = .001;
   EXPECT_TRUE(sample(blank, by_pitch).dots.empty()) << "white is what the paint is already";
   EXPECT_THROW(sample(white, SampleOptions{}), InputError);
-  SampleOptions both = options_for(100);
+  SampleOptions both = sample_options(100);
   both.pitch_m = .001;
   EXPECT_THROW(sample(white, both), InputError);
-  SampleOptions many = options_for(1000);
+  SampleOptions many = sample_options(1000);
   many.dot_limit = 999;
   EXPECT_THROW(sample(white, many), InputError);
 }

@@ -34,10 +34,10 @@ TEST(SquareMap, HasNoFlippedFaceAndFillsTheSquare) {
   for (const auto& [name, awkward] : test::awkward_meshes()) {
     SCOPED_TRACE(name);
     const TexturedMesh mesh = repair_mesh(awkward).mesh;
-    const Neighbours neighbours = find_neighbours(mesh.triangles);
-    for (const Component& component : find_components(mesh, neighbours)) {
+    const Neighbors neighbors = find_neighbors(mesh.triangles);
+    for (const Component& component : find_components(mesh, neighbors)) {
       std::string reason;
-      auto cut = cut_to_disk(mesh, neighbours, component, reason);
+      auto cut = cut_to_disk(mesh, neighbors, component, reason);
       ASSERT_TRUE(cut) << reason;
       const auto map = map_to_square(*cut);
       ASSERT_TRUE(map);
@@ -61,7 +61,7 @@ TEST(SquareMap, HasNoFlippedFaceAndFillsTheSquare) {
 
 TEST(SquareMap, KnowsHandlesAndBoundaries) {
   const auto shape = [](const TexturedMesh& mesh) {
-    const auto components = find_components(mesh, find_neighbours(mesh.triangles));
+    const auto components = find_components(mesh, find_neighbors(mesh.triangles));
     EXPECT_EQ(components.size(), 1u);
     return std::pair(components[0].genus, components[0].boundary_loops);
   };
@@ -73,9 +73,9 @@ TEST(SquareMap, KnowsHandlesAndBoundaries) {
 
 TEST(SquareMap, GivesAStripItsSquaresInARow) {
   const TexturedMesh mesh = test::rectangle(.05, .005, 40, 4);
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
   std::string reason;
-  auto cut = cut_to_disk(mesh, neighbours, find_components(mesh, neighbours)[0], reason);
+  auto cut = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0], reason);
   const auto map = map_to_square(*cut);
   ASSERT_TRUE(map);
   EXPECT_EQ(map->square_count, 10);
@@ -87,9 +87,9 @@ TEST(SquareMap, IsAllButConformalOnASlitBlob) {
   for (const double length : {1., 1.3, 1.7, 2.2, 3.}) {
     TexturedMesh mesh = test::sphere(.02, 96, 64);
     for (auto& vertex : mesh.vertices) vertex.z() *= length;
-    const Neighbours neighbours = find_neighbours(mesh.triangles);
+    const Neighbors neighbors = find_neighbors(mesh.triangles);
     std::string reason;
-    auto cut = cut_to_disk(mesh, neighbours, find_components(mesh, neighbours)[0], reason);
+    auto cut = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0], reason);
     const auto map = map_to_square(*cut);
     ASSERT_TRUE(map);
     EXPECT_LE(map->lengthening, 1.006) << length << ", squares " << map->square_count;

@@ -17,7 +17,7 @@ double saturating(double dose) {
   return 1 - std::exp(-3 * dose);
 }
 
-/// A flat picture of one metre by one: light grey rings on darker grey, and a white corner.
+/// A flat picture of one meter by one: light gray rings on darker gray, and a white corner.
 struct Sheet {
   Sheet()
       : mesh(test::with_texture(test::rectangle(1, 1, 1, 1), 96, 96,

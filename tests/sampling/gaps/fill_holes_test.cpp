@@ -36,7 +36,7 @@ double distance_to_dots(const std::vector<Dot>& dots, const Vector3d& place, con
   return std::sqrt(nearest);
 }
 
-/// visit(surface point) at the centres of the parts of all triangles, no part longer than `length_m`.
+/// visit(surface point) at the centers of the parts of all triangles, no part longer than `length_m`.
 template <class Visit>
 void probe(const TexturedMesh& mesh, double length_m, Visit visit) {
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
@@ -89,7 +89,7 @@ TEST(FillHoles, FindsAHoleThatWasCut) {
   EXPECT_GT(largest_gap_m(mesh, dots.dots, pitch), 5 * pitch);
   const DotSequence filled = fill_holes(curve, tone, dots, 1.1);
   EXPECT_LE(largest_gap_m(mesh, filled.dots, pitch), 1.1 * pitch);
-  // Of discs of radius r no fewer than A / (2.6 r^2) cover a hole; far-apart centres leave room for 1 / (.87 r^2).
+  // Of discs of radius r no fewer than A / (2.6 r^2) cover a hole; far-apart centers leave room for 1 / (.87 r^2).
   const double area = test::kPi * 36;
   EXPECT_GT(static_cast<double>(filled.dots.size() - left), area / 2.6 / 1.21 * .8);
   EXPECT_LT(static_cast<double>(filled.dots.size() - left), area / .87 / 1.21);
@@ -162,7 +162,7 @@ TEST(FillHoles, WhiteAndNoiseGetNothing) {
   const SurfaceCurve curve(half);
   for (const Dot& dot : fill_holes(curve, half_tone, place(curve, half_tone, 1000, Sampler::kJittered), .9).dots)
     EXPECT_LT(dot.position_O.x(), .026);
-  // A tenth of the texels black, each a third of a pitch: the picture is a light grey, not black points to be filled.
+  // A tenth of the texels black, each a third of a pitch: the picture is a light gray, not black points to be filled.
   const TexturedMesh noise = test::with_texture(
       plain, 200, 200, [](int i, int j) { return (i * 7 + j * 13 + i * j % 5) % 10 == 0 ? 0. : 1.; }, false, false);
   const ToneField noise_tone(noise, {});

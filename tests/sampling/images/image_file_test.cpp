@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// 3 x 2: red, green, blue above white, black, mid grey.
+/// 3 x 2: red, green, blue above white, black, mid gray.
 const std::vector<std::uint8_t> kPixels{255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 128, 128, 128};
 
 template <class Value>
@@ -63,7 +63,7 @@ TEST(ImageFile, KeepsChannelsAlphaAndSixteenBits) {
   ASSERT_TRUE(texture) << reason;
   EXPECT_EQ(texture->channels, 2);
   EXPECT_NEAR(texture->opacity.at(1), .2, 1e-4);
-  EXPECT_NEAR(texture->luminance[1], 1, 1e-4) << "colour is not multiplied by alpha";
+  EXPECT_NEAR(texture->luminance[1], 1, 1e-4) << "color is not multiplied by alpha";
   texture = load_image_file(save<std::uint8_t>(disk, "rgba.png", 1, 1, 4, {255, 255, 255, 0}), 1000, reason);
   ASSERT_TRUE(texture) << reason;
   EXPECT_EQ(texture->channels, 4);

@@ -22,8 +22,8 @@ double distance_to(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& pl
 
 TEST(GrowingBall, OnAPlateTrianglesAreAsFarAsTheyLook) {
   const TexturedMesh mesh = test::rectangle(.05, .03, 11, 7);
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
-  GrowingBall ball(mesh, neighbours);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
+  GrowingBall ball(mesh, neighbors);
   for (const std::uint32_t start : {0u, 40u, 77u}) {
     const Vector3d center = position(mesh, {start, {.3, .3, .4}});
     ball.begin(center, start);
@@ -35,8 +35,8 @@ TEST(GrowingBall, OnAPlateTrianglesAreAsFarAsTheyLook) {
 TEST(GrowingBall, TheOtherSideOfAFoldIsAsFarAsTheFold) {
   const double side = .04;
   const TexturedMesh mesh = test::folded_sheet(side, .1, 8, 8);
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
-  GrowingBall ball(mesh, neighbours);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
+  GrowingBall ball(mesh, neighbors);
   // The fourth row from the fold, in the middle of the sheet; straight up is the other half, 2 mm away.
   for (std::uint32_t start = 0; start < mesh.triangle_count(); ++start) {
     const Vector3d center = position(mesh, {start, {.3, .3, .4}});
@@ -56,9 +56,9 @@ TEST(GrowingBall, TheOtherSideOfAFoldIsAsFarAsTheFold) {
 TEST(GrowingBall, EndsAtItsLimitAndAtTheComponent) {
   const TexturedMesh one = test::rectangle(.05, .05, 10, 10);
   const TexturedMesh mesh = test::both(one, one, {0, 0, .001});
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
   const auto last = static_cast<std::uint32_t>(one.triangle_count() - 1), above = last + 1;
-  GrowingBall ball(mesh, neighbours);
+  GrowingBall ball(mesh, neighbors);
   ball.begin(mesh.corner(0, 0), 0);
   EXPECT_EQ(ball.entry2(0, 1e-9), 0);
   EXPECT_EQ(ball.entry2(last, .01 * .01), kFar);

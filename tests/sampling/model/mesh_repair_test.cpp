@@ -27,8 +27,8 @@ double volume(const TexturedMesh& mesh) {
 /// Every edge one or two triangles that run alike, every vertex one fan.
 void expect_manifold(const TexturedMesh& mesh) {
   for (const EdgeGroup& group : edge_table(mesh.triangles).groups) EXPECT_LE(group.end - group.begin, 2u);
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
-  const Fans fans = find_fans(neighbours);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
+  const Fans fans = find_fans(neighbors);
   EXPECT_EQ(fans.count, mesh.vertices.size());
 }
 
@@ -104,7 +104,7 @@ TEST(MeshRepair, SeparatesSolidsThatOnlyTouch) {
   const auto meshes = test::awkward_meshes();
   for (const char* name : {"cubes that share an edge", "cubes that share a corner"}) {
     const RepairedMesh repaired = repair_mesh(meshes.at(name));
-    const auto components = find_components(repaired.mesh, find_neighbours(repaired.mesh.triangles));
+    const auto components = find_components(repaired.mesh, find_neighbors(repaired.mesh.triangles));
     ASSERT_EQ(components.size(), 2u) << name;
     for (const Component& component : components) {
       EXPECT_EQ(component.genus, 0);

@@ -39,14 +39,14 @@ class ModelOnDisk {
     return refusal("model.wrl", "#VRML V2.0 utf8\n" + body, limits);
   }
 
-  /// Any existing file is a picture: 2 x 1 texels, dark and light; "grey" in its name makes it one channel.
+  /// Any existing file is a picture: 2 x 1 texels, dark and light; "gray" in its name makes it one channel.
   static std::optional<Texture> fake_image(const std::filesystem::path& file, std::size_t, std::string& reason) {
     if (!std::filesystem::exists(file)) {
       reason = "there is no such file";
       return std::nullopt;
     }
     Texture texture{2, 1, 3, {.25f, .75f}, {}, file.filename().string()};
-    if (texture.name.find("grey") != std::string::npos) texture.channels = 1;
+    if (texture.name.find("gray") != std::string::npos) texture.channels = 1;
     return texture;
   }
 

@@ -29,7 +29,7 @@ std::string refusal(const Model& model, const PlacementOptions& options) {
   return "";
 }
 
-TEST(Placement, StandsTheObjectUprightOnTheTableCentredOnTheAxis) {
+TEST(Placement, StandsTheObjectUprightOnTheTableCenteredOnTheAxis) {
   Model model = slanted();
   model.unit_m = .01;
   const TexturedMesh mesh = place_on_table(model, {});

@@ -46,12 +46,12 @@ auto contents(const TexturedMesh& mesh) {
   return result;
 }
 
-/// Mean of how far apart the numbers of neighbours are.
+/// Mean of how far apart the numbers of neighbors are.
 double mean_gap(const TexturedMesh& mesh) {
-  const Neighbours neighbours = find_neighbours(mesh.triangles);
+  const Neighbors neighbors = find_neighbors(mesh.triangles);
   double sum = 0, count = 0;
-  for (std::uint32_t t = 0; t < neighbours.size(); ++t)
-    for (const TriangleSide other : neighbours[t])
+  for (std::uint32_t t = 0; t < neighbors.size(); ++t)
+    for (const TriangleSide other : neighbors[t])
       if (other != kNoSide) {
         sum += std::abs(static_cast<double>(other.triangle) - t);
         ++count;
@@ -71,7 +71,7 @@ TexturedMesh two_spheres() {
   return mesh;
 }
 
-TEST(RenumberAlongSurface, ItIsTheSameSurfaceAndNeighboursHaveNearNumbers) {
+TEST(RenumberAlongSurface, ItIsTheSameSurfaceAndNeighborsHaveNearNumbers) {
   const TexturedMesh mesh = shuffled(two_spheres(), 3);
   TexturedMesh renumbered = mesh;
   renumber_along_surface(renumbered);
@@ -86,8 +86,8 @@ TEST(RenumberAlongSurface, PartsKeepTheirOrder) {
     const TexturedMesh mesh = shuffled(two_spheres(), seed);
     TexturedMesh renumbered = mesh;
     renumber_along_surface(renumbered);
-    const auto before = find_components(mesh, find_neighbours(mesh.triangles));
-    const auto after = find_components(renumbered, find_neighbours(renumbered.triangles));
+    const auto before = find_components(mesh, find_neighbors(mesh.triangles));
+    const auto after = find_components(renumbered, find_neighbors(renumbered.triangles));
     ASSERT_EQ(after.size(), before.size());
     for (std::size_t i = 0; i < after.size(); ++i)
       EXPECT_EQ(after[i].triangles.size(), before[i].triangles.size()) << "seed " << seed;

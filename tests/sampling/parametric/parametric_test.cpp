@@ -41,7 +41,7 @@ TEST(ParametricSurface, DerivativesAreThoseOfThePosition) {
       const Vector2d u(1, 0), v(0, 1);
       const auto position = [&](const Vector2d& p) { return surface->position(p); };
       const Tangents t = surface->tangents(uv);
-      // The super-ellipsoid's own parameterisation has edges where derivatives are large without bound.
+      // The super-ellipsoid's own parameterization has edges where derivatives are large without bound.
       const double scale = 1e-4 * (1 + std::pow(std::max(t.du.norm(), t.dv.norm()), 2));
       EXPECT_LT((central(u, position) - t.du).norm(), scale) << name_of(shape) << " at " << uv.transpose();
       EXPECT_LT((central(v, position) - t.dv).norm(), scale) << name_of(shape) << " at " << uv.transpose();
@@ -73,16 +73,16 @@ TEST(ParametricSurface, CurvaturesInClosedForm) {
     }
 }
 
-TEST(ParametricSurface, SuperEllipsoidIsOneSurfaceInTwoParameterisations) {
+TEST(ParametricSurface, SuperEllipsoidIsOneSurfaceInTwoParameterizations) {
   for (const ParametricShape shape :
-       {ParametricShape::kSuperEllipsoid, ParametricShape::kSuperEllipsoidReparameterised})
+       {ParametricShape::kSuperEllipsoid, ParametricShape::kSuperEllipsoidReparameterized})
     for (double x = .01; x < 1; x += .06)
       for (double y = .01; y < 1; y += .06) {
         const Vector3d p = make_surface(shape)->position({x, y});
         EXPECT_NEAR(p.array().pow(6).sum(), 1, 1e-12) << name_of(shape) << " at " << x << " " << y;
       }
   // The power law bounds the derivatives.
-  const auto smooth = make_surface(ParametricShape::kSuperEllipsoidReparameterised);
+  const auto smooth = make_surface(ParametricShape::kSuperEllipsoidReparameterized);
   for (double x = 0; x <= 1; x += .03125)
     for (double y = 0; y <= 1; y += .03125) {
       const Tangents t = smooth->tangents({x, y});
@@ -110,10 +110,10 @@ TEST(MeasureParametric, MethodsBAndCAgreeWithTheTrueArea) {
       EXPECT_NEAR(areas.by_method[1], area, 1e-4 * area) << name_of(shape);
       EXPECT_NEAR(areas.by_method[2], area, 1e-4 * area) << name_of(shape);
     }
-  // The reparameterised super-ellipsoid is measured by (c) as well as by (b), the plain one is not: section 4.5.
+  // The reparameterized super-ellipsoid is measured by (c) as well as by (b), the plain one is not: section 4.5.
   options.curve = CurveKind::kHilbert;
   const ParametricAreas smooth =
-      measure_parametric(*make_surface(ParametricShape::kSuperEllipsoidReparameterised), options);
+      measure_parametric(*make_surface(ParametricShape::kSuperEllipsoidReparameterized), options);
   EXPECT_NEAR(smooth.by_method[2], smooth.by_method[1], 1e-3 * smooth.by_method[1]);
   const ParametricAreas plain = measure_parametric(*make_surface(ParametricShape::kSuperEllipsoid), options);
   EXPECT_GT(plain.by_method[1] - plain.by_method[2], .01 * plain.by_method[1]);

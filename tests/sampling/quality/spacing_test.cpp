@@ -97,7 +97,7 @@ TEST(Coherence, OfRowsIsThatOfTheirDistance) {
   EXPECT_EQ(rows.pairs.size(), 20'000u);
 }
 
-TEST(Coherence, NeighboursOnACurveAreNeighboursInTheSquare) {
+TEST(Coherence, NeighborsOnACurveAreNeighborsInTheSquare) {
   for (const PlaneCurve curve : {PlaneCurve::kHilbert, PlaneCurve::kPeano2, PlaneCurve::kRows}) {
     // Depth 1 of Peano: nine places in a row of steps; any pair k apart is at most k steps away.
     const int depth = 3;

@@ -130,7 +130,7 @@ TEST(SurfaceQuality, AGridOnAPlateHasItsHoleSpacingAndPath) {
 }
 
 TEST(SurfaceQuality, TheTwoSidesOfAThinPlateAreApart) {
-  // Two plates a tenth of a pitch apart, facing away from each other; dots on one are no neighbours of dots on the
+  // Two plates a tenth of a pitch apart, facing away from each other; dots on one are no neighbors of dots on the
   // other.
   TexturedMesh back = test::rectangle(.05, .05, 2, 2);
   for (auto& triangle : back.triangles) std::swap(triangle[1], triangle[2]);
@@ -199,7 +199,7 @@ TEST(SurfaceQuality, AWhiteSurfaceIsRefused) {
   EXPECT_THROW(SurfaceQuality(white, &tone), InputError);
 }
 
-/// What the product promises: strata centres are better than the thesis's jitter.
+/// What the product promises: strata centers are better than the thesis's jitter.
 TEST(SurfaceQuality, CentroidIsBetterThanJitteredAndThatThanRandom) {
   const TexturedMesh mesh = test::sphere(.025);
   const SurfaceCurve curve(mesh);

@@ -21,7 +21,7 @@ double asked_energy(const ToneField& tone, double pitch_m) {
 }
 
 TEST(Levels, TheDensityCurveTimesTheLevelIsTheCurve) {
-  for (int count = 1; count <= kMostLevels; ++count) {
+  for (int count = 1; count <= kMaxLevels; ++count) {
     const std::vector<double> levels = energy_levels(count, 2);
     ASSERT_EQ(levels.size(), static_cast<std::size_t>(count));
     const ToneCurve density = density_curve(kCurve, levels);
@@ -51,12 +51,12 @@ TEST(Levels, FlatToneHasOneLevelThroughout) {
 }
 
 TEST(Levels, EnergiesAddUpToWhatIsAsked) {
-  TexturedMesh mesh = test::rectangle(.02, .02, 8, 8);  // a ramp of greys over all levels, in steps and smooth
+  TexturedMesh mesh = test::rectangle(.02, .02, 8, 8);  // a ramp of grays over all levels, in steps and smooth
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
     for (int c = 0; c < 3; ++c)
       mesh.corner_luminance[t][static_cast<std::size_t>(c)] =
           static_cast<float>(t % 3 == 0 ? .3 : std::clamp(mesh.corner(t, c).x() / .02, 0., 1.));
-  for (int count = 2; count <= kMostLevels; ++count) {
+  for (int count = 2; count <= kMaxLevels; ++count) {
     const std::vector<double> levels = energy_levels(count, 2);
     ToneOptions options{.untextured = Untextured::kMaterial, .curve = kCurve};
     const ToneField asked(mesh, options);

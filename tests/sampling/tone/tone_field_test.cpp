@@ -89,7 +89,7 @@ TEST(ToneField, CollapsedTextureCoordinatesStillHaveATone) {
   }
 }
 
-TEST(ToneField, LinearColoursAreExactAcrossTheCurvesKnots) {
+TEST(ToneField, LinearColorsAreExactAcrossTheCurvesKnots) {
   std::mt19937 random(kToneSeed);
   std::uniform_real_distribution<float> uniform(0, 1);
   TexturedMesh mesh = test::rectangle(.05, .03, 4, 2);
@@ -163,7 +163,7 @@ TEST(ToneField, UntexturedParts) {
     options.untextured = rule;
     return ToneField(mesh, options).is_blank(2);
   };
-  EXPECT_TRUE(is_blank(Untextured::kAuto)) << "another part has colours";
+  EXPECT_TRUE(is_blank(Untextured::kAuto)) << "another part has colors";
   EXPECT_TRUE(is_blank(Untextured::kBlank));
   EXPECT_FALSE(is_blank(Untextured::kMaterial));
   mesh.materials[0].source = ColorSource::kMaterial;

@@ -170,7 +170,7 @@ TEST(Film, BeamsMeetASphereWhereTheRayDoes) {
   EXPECT_EQ(checked, 300);
 }
 
-TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimetres) {
+TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimeters) {
   CellDescription cell = handmade_cell();
   cell.arm.beam_depression = 90 * kDegree;
   TexturedMesh mesh = square(.01, 0);  // triangles 0 and 1: the lit face

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kLoopPitch = .254e-3;
 
-/// Bars of black on white, some thinner than a pitch, and a transparent part: a tone curve made on flat grey gets their
+/// Bars of black on white, some thinner than a pitch, and a transparent part: a tone curve made on flat gray gets their
 /// coverage wrong.
 TexturedMesh bars() {
   TexturedMesh mesh = test::square(60 * kLoopPitch);

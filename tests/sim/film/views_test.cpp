@@ -65,7 +65,7 @@ TEST(OrthographicView, ShowsTheNearestFaceAndTheRightPlaceOnIt) {
       EXPECT_LT(p_O.y(), 1e-4);
       const auto pixel = view.pixel_of(p_O, 1e-4);
       ASSERT_TRUE(pixel);
-      // Places on the border of a pixel may round to its neighbour.
+      // Places on the border of a pixel may round to its neighbor.
       EXPECT_LE((*pixel - Eigen::Vector2i(x, y)).cwiseAbs().maxCoeff(), 1);
       EXPECT_EQ(view.pixel(x, y).point.triangle, row[x].point.triangle);
     }

@@ -178,7 +178,7 @@ TEST(TrueCell, ALowerLimitBringsThePowerDown) {
   bench.pass(.01);
   bench.cell.set_power_max(.05);
   bench.pass(.01);
-  bench.cell.darken();
+  bench.cell.disarm();
   ASSERT_EQ(bench.emissions.size(), 2u);
   EXPECT_EQ(bench.emissions[0].power_w, .1);
   EXPECT_EQ(bench.emissions[1].power_w, .05);

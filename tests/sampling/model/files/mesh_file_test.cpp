@@ -61,7 +61,7 @@ TEST(ObjFile, ReadsColorsOfPoints) {
   EXPECT_NEAR(model.mesh.corner_luminance[0][0], .2126, 1e-3);
   EXPECT_NEAR(model.mesh.corner_luminance[0][1], .7152, 1e-3);
   EXPECT_NEAR(model.mesh.corner_luminance[0][2], 1, 1e-6);
-  EXPECT_TRUE(warns(model, "1 of 3 points have no colour"));
+  EXPECT_TRUE(warns(model, "1 of 3 points have no color"));
 }
 
 TEST(ObjFile, ReportsWhatIsWrongWithItsLine) {
@@ -77,11 +77,11 @@ TEST(ObjFile, ReportsWhatIsWrongWithItsLine) {
   EXPECT_EQ(disk.load("m.obj", points + "v nan 0 0\nf 1 2 3\nf 1 2 4\n").mesh.triangle_count(), 1u);
 }
 
-TEST(ObjFile, WithoutAWordOfColorIsPaintedGrey) {
+TEST(ObjFile, WithoutAWordOfColorIsPaintedGray) {
   const ModelOnDisk disk;
   const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   const Model model = disk.load("m.obj", triangle);
-  EXPECT_TRUE(warns(model, "says nothing of colour"));
+  EXPECT_TRUE(warns(model, "says nothing of color"));
   EXPECT_NEAR(model.mesh.corner_luminance[0][0], .604, 1e-3);  // sRGB .8 in linear light
   disk.write("m.mtl", "newmtl a\nKd 1 1 1\n");
   EXPECT_EQ(disk.load("m.obj", "mtllib m.mtl\nusemtl a\n" + triangle).mesh.corner_luminance[0][0], 1)
@@ -108,7 +108,7 @@ TEST(ObjFile, ReadsNothingOutsideItsFolder) {
   const Model model =
       disk.load("m.obj", "mtllib ../secret.mtl\nmtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_TRUE(warns(model, "outside the model's folder"));
-  EXPECT_GT(model.mesh.corner_luminance[0][0], .5) << "the default grey, not the black of the library outside";
+  EXPECT_GT(model.mesh.corner_luminance[0][0], .5) << "the default gray, not the black of the library outside";
   EXPECT_TRUE(model.mesh.textures.empty());
   EXPECT_EQ(model.files.size(), 2u);
 }

@@ -108,7 +108,7 @@ TEST(VrmlFaces, RunTheWayCcwAndMirrorsSay) {
 TEST(VrmlColors, ComeFromTextureThenColorsThenMaterial) {
   const ModelOnDisk disk;
   disk.write("rgb.png", "x");
-  disk.write("grey.png", "x");
+  disk.write("gray.png", "x");
   const std::string faces =
       "IndexedFaceSet { coord Coordinate { point [ 0 0 0 1 0 0 1 1 0 0 1 0 ] } coordIndex [ 0 1 2 -1 0 2 3 -1 ] ";
   const std::string per_face = faces + "color Color { color [ 1 1 1, 0 0 0 ] } colorPerVertex FALSE }";
@@ -131,9 +131,9 @@ TEST(VrmlColors, ComeFromTextureThenColorsThenMaterial) {
   EXPECT_EQ(mesh.textures.at(0).channels, 3);
   EXPECT_FALSE(mesh.materials[0].repeat_u);
   EXPECT_TRUE(mesh.materials[0].repeat_v);
-  mesh = disk.load_vrml(shape(per_face, "Appearance { texture ImageTexture { url \"grey.png\" } }")).mesh;
+  mesh = disk.load_vrml(shape(per_face, "Appearance { texture ImageTexture { url \"gray.png\" } }")).mesh;
   EXPECT_EQ(mesh.textures.at(0).channels, 1);
-  EXPECT_EQ(mesh.corner_luminance[1][0], 0) << "a grey image multiplies the colours, so they must be there";
+  EXPECT_EQ(mesh.corner_luminance[1][0], 0) << "a gray image multiplies the colors, so they must be there";
 }
 
 TEST(VrmlColors, AreFoundPerVertexAndPerFaceWithAndWithoutIndex) {
@@ -144,7 +144,7 @@ TEST(VrmlColors, AreFoundPerVertexAndPerFaceWithAndWithoutIndex) {
   const auto load = [&](const std::string& rest) {
     return disk.load_vrml(shape(faces + rest + " }")).mesh.corner_luminance;
   };
-  EXPECT_EQ(load("")[0], (std::array<float, 3>{1, 0, 1})) << "colours go with the points";
+  EXPECT_EQ(load("")[0], (std::array<float, 3>{1, 0, 1})) << "colors go with the points";
   EXPECT_EQ(load("colorIndex [ 0 1 2 -1 1 1 0 -1 ]")[1], (std::array<float, 3>{1, 1, 0}));
   EXPECT_EQ(load("colorPerVertex FALSE")[0], (std::array<float, 3>{0, 0, 0}));
   EXPECT_EQ(load("colorPerVertex FALSE colorIndex [ 1 0 ]")[0], (std::array<float, 3>{1, 1, 1}));
@@ -390,12 +390,12 @@ TEST(VrmlInline, IsReadOnlyBelowTheModelsFolder) {
 
 TEST(Vrml1, StateGoesAlongAndSeparatorsHoldItBack) {
   const ModelOnDisk disk;
-  disk.write("grey.png", "x");
+  disk.write("gray.png", "x");
   const Model model = disk.load("old.wrl",
                                 "#VRML V1.0 ascii\nSeparator {\n Separator { Translation { translation 10 0 0 } "
                                 "Material { diffuseColor 0 0 0 } Cube { width 1 height 1 depth 1 } }\n"
                                 " Scale { scaleFactor 2 1 1 } Cube { width 1 height 1 depth 1 } Texture2 { filename "
-                                "\"grey.png\" wrapS CLAMP }\n Cube { width 1 height 1 depth 1 } }");
+                                "\"gray.png\" wrapS CLAMP }\n Cube { width 1 height 1 depth 1 } }");
   ASSERT_EQ(model.mesh.triangle_count(), 36u);
   EXPECT_NEAR(signed_volume(model.mesh), 1 + 2 + 2, 1e-12);
   EXPECT_EQ(model.mesh.materials[model.mesh.material_index[0]].source, ColorSource::kMaterial);
