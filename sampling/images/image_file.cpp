@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "sampling/base/input_error.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
@@ -33,12 +34,6 @@ const std::vector<float>& linear_of_code() {
     return values;
   }();
   return table;
-}
-
-std::string lower_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
 }
 
 /// OpenImageIO's name of the file's format by its first bytes (TGA has no signature: by its ending), or empty. Choosing

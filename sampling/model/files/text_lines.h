@@ -7,6 +7,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "sampling/base/text.h"
+
 /// Lines and words of the line-based mesh formats.
 namespace hilbrush {
 
@@ -24,17 +26,8 @@ inline std::optional<std::string_view> take_line(std::string_view& text) {
   return line;
 }
 
-/// ASCII letters only.
-inline std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return lower;
-}
-
 /// Takes the next word off `line`; empty at its end.
 inline std::string_view take_word(std::string_view& line) {
-  constexpr std::string_view kBlanks = " \t\r\n\v\f";
   const std::size_t begin = line.find_first_not_of(kBlanks);
   if (begin == line.npos) {
     line = {};
@@ -55,14 +48,6 @@ std::optional<Number> number_in(std::string_view word) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
   if (error != std::errc() || end != word.data() + word.size() || word.empty()) return std::nullopt;
   return number;
-}
-
-/// The rest of a line without blanks around it.
-inline std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n\v\f";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == text.npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
 }  // namespace hilbrush
