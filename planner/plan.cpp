@@ -40,18 +40,18 @@ Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress&
   Plan plan;
   plan.program.pitch_m = dots.pitch_m;
   const std::vector<std::uint32_t> dot_indices = dots_with_energy(implementation.cell, dots, plan.skipped);
-  const Progress search_progress = part_of(progress, 0, .8);
+  const Progress search_progress = progress.part(0, .8);
   PosedDots posed = implementation.options.policy == PosePolicy::kFollowNormal
                         ? follow_normal(implementation, dots, dot_indices, search_progress)
                         : search_poses(implementation, dots, dot_indices, search_progress);
   for (SkippedDot& skipped : posed.skipped) plan.skipped.push_back(std::move(skipped));
 
-  build_program(implementation, dots, posed, plan, part_of(progress, .8, 1));
+  build_program(implementation, dots, posed, plan, progress.part(.8, 1));
   std::stable_sort(plan.skipped.begin(), plan.skipped.end(),
                    [](const SkippedDot& a, const SkippedDot& b) { return a.dot_index < b.dot_index; });
   CHECK_EQ(plan.program.exposures.size() + plan.skipped.size(), dots.dots.size());
   plan.time = estimate_time(implementation.cell, plan.program);
-  if (progress) progress(1);
+  progress(1);
   return plan;
 }
 

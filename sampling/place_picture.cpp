@@ -41,11 +41,9 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
   // n rounds place n + 1 times; each tells its own share of the progress, and so does the search.
   const double parts = options.predictive_rounds + 1 + (is_fine ? 1 : 0);
   int part = 0;
-  const auto next_part = [&]() -> Progress {
-    const double begin = part++ / parts;
-    return [&progress, begin, parts](double fraction) {
-      if (progress) progress(begin + fraction / parts);
-    };
+  const auto next_part = [&] {
+    ++part;
+    return progress.part((part - 1) / parts, part / parts);
   };
   const auto place = [&](const ToneField& density) {
     if (options.curve == CurveKind::kLaminar)

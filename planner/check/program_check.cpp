@@ -289,8 +289,7 @@ std::vector<ProgramFault> check_program(const ExposureProgram& program, const st
       }
     });
     for (Faults& block : found) faults.insert(faults.end(), block.begin(), block.end());
-    if (progress)
-      progress(static_cast<double>(std::min(first + kBlocksAtOnce, block_count)) / static_cast<double>(block_count));
+    progress.step(std::min(first + kBlocksAtOnce, block_count), block_count);
   }
   faults.resize(std::min(faults.size(), limit));
   return faults;

@@ -235,16 +235,16 @@ AimCosts aim_costs(const PlanOptions& options) {
 
 Aims choose_aims(const AimedDots& dots, const AimCosts& costs, const Progress& progress) {
   Aims aims;
-  aims.beams_O = AimLocation(dots, costs).solve(part_of(progress, 0, .5));
+  aims.beams_O = AimLocation(dots, costs).solve(progress.part(0, .5));
   aims.of_dot.assign(dots.size(), kNoAim);
   const std::size_t block_count = (dots.size() + kAimBlock - 1) / kAimBlock;
-  const Progress told = part_of(progress, .5, 1);
+  const Progress choice = progress.part(.5, 1);
   for (std::size_t first = 0; first < block_count; first += kBlocksAtOnce) {
     tbb::parallel_for(first, std::min(first + kBlocksAtOnce, block_count), [&](std::size_t b) {
       const std::size_t end = std::min(dots.size(), (b + 1) * kAimBlock);
       BlockOfAims(dots, costs, aims.beams_O).choose(b * kAimBlock, end, aims.of_dot.data());
     });
-    told(static_cast<double>(std::min(first + kBlocksAtOnce, block_count)) / static_cast<double>(block_count));
+    choice.step(std::min(first + kBlocksAtOnce, block_count), block_count);
   }
   return aims;
 }

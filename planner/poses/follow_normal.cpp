@@ -107,7 +107,7 @@ PosedDots follow_normal(const Reach::Implementation& reach, const DotSequence& d
       posed.sequence.push_back({dot_indices[i], now = *joints});
     else
       posed.skipped.push_back(std::move(skipped));
-    if (progress && i % 512 == 0) progress(static_cast<double>(i) / static_cast<double>(dot_indices.size()));
+    if (i % 512 == 0) progress.step(i, dot_indices.size());
   }
   return posed;
 }

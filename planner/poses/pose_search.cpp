@@ -95,26 +95,23 @@ std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, T
 PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& dots,
                        std::span<const std::uint32_t> dot_indices, const Progress& progress) {
   const AimedDots aimed(reach, dots, dot_indices);
-  const auto tell = [&](double fraction) {
-    if (progress) progress(fraction);
-  };
   AimCosts costs = aim_costs(reach.options);
   // The more dots, the nearer to the shortest possible step all of them are, and the sooner a fast plan is wanted.
   if (reach.options.planning == Planning::kFast)
     costs.kicks = std::min(costs.kicks, kKicksOfFastPlan / std::max<std::size_t>(1, dot_indices.size()));
   PosedDots posed;
   std::vector<std::uint32_t> left;
-  std::vector<Tour> tours = tours_of(choose_aims(aimed, costs, part_of(progress, 0, .4)), left);
+  std::vector<Tour> tours = tours_of(choose_aims(aimed, costs, progress.part(0, .4)), left);
   place_stations(aimed, tours, left);
   remove_misfits(aimed, tours, left);
-  tell(.5);
+  progress(.5);
   const std::size_t common = tours.size();
-  serve_leftovers(aimed, std::move(left), tours, posed.skipped, part_of(progress, .5, .7));
+  serve_leftovers(aimed, std::move(left), tours, posed.skipped, progress.part(.5, .7));
   if (tours.size() > common) {
     std::vector<std::uint32_t> none;
     place_stations(aimed, tours, none);
   }
-  tell(.7);
+  progress(.7);
 
   std::vector<Joints> first(tours.size());
   Joints before = home_joints(reach.cell);
@@ -124,7 +121,7 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   for (std::size_t begin = 0; begin < tours.size(); begin += kToursAtOnce) {
     const std::size_t end = std::min(tours.size(), begin + kToursAtOnce);
     tbb::parallel_for(begin, end, [&](std::size_t t) { parts[t] = posed_tour(aimed, costs, tours[t], first[t]); });
-    tell(.7 + .3 * static_cast<double>(end) / static_cast<double>(tours.size()));
+    progress(.7 + .3 * static_cast<double>(end) / static_cast<double>(tours.size()));
   }
   posed.sequence.reserve(dot_indices.size());
   before = home_joints(reach.cell);
@@ -137,7 +134,7 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
     before = part.back().joints;
     part = {};
   }
-  tell(1);
+  progress(1);
   return posed;
 }
 

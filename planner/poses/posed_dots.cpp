@@ -17,12 +17,6 @@ Joints home_joints(const CellDescription& cell) {
   return home;
 }
 
-Progress part_of(const Progress& progress, double from, double to) {
-  return [progress, from, to](double fraction) {
-    if (progress) progress(from + (to - from) * fraction);
-  };
-}
-
 double step_s(const CellDescription& cell, const Joints& from, const Joints& to) {
   return move_s(cell, from, to) + settle_s(cell, from, to);
 }

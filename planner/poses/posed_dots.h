@@ -23,9 +23,6 @@ struct PosedDots {
 Target target_of(const Dot& dot);
 Joints home_joints(const CellDescription& cell);
 
-/// Progress within a stage that goes from one fraction of the whole to another.
-Progress part_of(const Progress& progress, double from, double to);
-
 /// Move and settle of a direct move between two exposures.
 double step_s(const CellDescription& cell, const Joints& from, const Joints& to);
 

@@ -138,7 +138,7 @@ void build_program(const Reach::Implementation& reach, const DotSequence& dots, 
   ProgramBuilder builder(reach, dots, plan);
   for (std::size_t first = 0; first < count; first += kWayBlock) {
     builder.add_block(posed.sequence.data() + first, std::min(kWayBlock, count - first));
-    if (progress) progress(static_cast<double>(std::min(count, first + kWayBlock)) / static_cast<double>(count));
+    progress.step(std::min(count, first + kWayBlock), count);
   }
   builder.add_stranded();
   builder.go_home();

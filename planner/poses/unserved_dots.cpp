@@ -38,7 +38,7 @@ class Leftovers {
       tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, 16), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) find_pose(left[i], home, left_[i], refused[i]);
       });
-      progress(static_cast<double>(end) / static_cast<double>(left.size()));
+      progress.step(end, left.size());
     }
     for (std::size_t i = 0; i < left.size(); ++i)
       if (!left_[i].is_reachable) skipped.push_back(std::move(refused[i]));
@@ -146,9 +146,9 @@ void serve_leftovers(const AimedDots& dots, std::vector<std::uint32_t> left, std
                      std::vector<SkippedDot>& skipped, const Progress& progress) {
   std::sort(left.begin(), left.end());
   Leftovers leftovers(dots, tours);
-  leftovers.find_poses(left, skipped, part_of(progress, 0, .5));
+  leftovers.find_poses(left, skipped, progress.part(0, .5));
   leftovers.join_tours();
-  leftovers.open_stations(part_of(progress, .5, 1));
+  leftovers.open_stations(progress.part(.5, 1));
   for (Tour& tour : tours) std::sort(tour.dots.begin(), tour.dots.end());
 }
 

@@ -263,7 +263,7 @@ class Relaxation {
         const std::size_t begin = stretches[s] * Coloring::kStretch;
         for (std::size_t i = begin; i < std::min(begin + Coloring::kStretch, dots_.size()); ++i) visit(i);
       });
-    if (progress) progress(.5 + .5 * (sweep + 1) / kSweeps);
+    progress(static_cast<double>(sweep + 1) / kSweeps);
   }
 
   const SurfaceCurve& curve_;
@@ -316,14 +316,12 @@ DotSequence place_blue(const SurfaceCurve& curve, const ToneField& tone, const S
   SampleReport figures;
   sequence.pitch_m = pitch_of(mass, options, count);
   if (count > 0) {
-    const auto first_half = [&](double fraction) {
-      if (progress) progress(.5 * fraction);
-    };
-    const PlacedStrata strata = place_strata(mass, tone, options, count, figures, first_half);
+    const PlacedStrata strata = place_strata(mass, tone, options, count, figures, progress.part(0, .5));
     Relaxation relaxation(curve, tone, strata, options.seed);
-    relaxation.choose(progress);
-    relaxation.refine(progress);
-    relaxation.even_out(progress);
+    const Progress second_half = progress.part(.5, 1);
+    relaxation.choose(second_half);
+    relaxation.refine(second_half);
+    relaxation.even_out(second_half);
     sequence.dots = dots_at(curve, tone, relaxation.dots());
     measure_paths(sequence.dots, figures);
   }

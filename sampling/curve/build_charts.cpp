@@ -28,7 +28,7 @@ std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbors
       flats[i] = flatten(mesh, neighbors, components[i], components[i].area_m2 / area);
     });
     for (std::size_t i = begin; i < end; ++i) done += components[i].triangles.size();
-    if (progress) progress(kFlattenShare * static_cast<double>(done) / static_cast<double>(mesh.triangle_count()));
+    progress.step(done, mesh.triangle_count());
   }
   return flats;
 }
@@ -101,7 +101,7 @@ struct PieceIndex {
 
 Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<Component>& components,
                     CurveKind kind, const Progress& progress) {
-  std::vector<FlatComponent> flats = flatten_all(mesh, neighbors, components, progress);
+  std::vector<FlatComponent> flats = flatten_all(mesh, neighbors, components, progress.part(0, kFlattenShare));
   Charts result;
   std::vector<PieceIndex> pieces;
   std::vector<ChainPiece> chain_pieces_of;
@@ -136,7 +136,7 @@ Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const 
       report.is_mapped = false;
       report.order_reason = "its map onto the square is too sheared to be walked";
     }
-  if (progress) progress(1);
+  progress(1);
   return result;
 }
 

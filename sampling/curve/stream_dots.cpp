@@ -162,7 +162,7 @@ void stream_dots(const CurveMass& mass, const SampleOptions& options, const DotV
     BlockStream(plan).run([&](const DotBlock& block, std::uint64_t done) {
       meter.follow(block);
       visit(block.dots);
-      if (progress) progress(static_cast<double>(done) / static_cast<double>(count));
+      progress.step(done, count);
     });
   }
   meter.finish(count);

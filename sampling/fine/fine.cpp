@@ -102,7 +102,7 @@ DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSeq
     descent.step(pass, options.passes);
     const double error = descent.paint();
     if (error < best) best = error, best_places = descent.places();
-    if (progress) progress(static_cast<double>(pass + 1) / options.passes);
+    progress(static_cast<double>(pass + 1) / options.passes);
   }
   tbb::parallel_for(std::size_t{0}, best_places.size(), [&](std::size_t i) {
     const SurfacePlace& place = best_places[i];

@@ -173,13 +173,13 @@ DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequ
     for (std::uint64_t added = 1; added > 0 && result.voronoi_rounds < kMaxRounds; ++result.voronoi_rounds) {
       added = filling.fill_circles();
       result.added += added;
-      if (progress) progress((result.voronoi_rounds + 1.) / (kMaxRounds + 1));
+      progress((result.voronoi_rounds + 1.) / (kMaxRounds + 1));
     }
     result.added_by_sweep = filling.sweep();
     result.added += result.added_by_sweep;
     dots.dots = filling.take_dots();
   }
-  if (progress) progress(1);
+  progress(1);
   if (report) *report = result;
   return dots;
 }

@@ -207,7 +207,7 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   SliceWalk walk(surroundings, component_of, tone, pitch, length / static_cast<double>(count));
   for (std::size_t k = 0; k < slices.count(); ++k) {
     walk.walk_slice(join(slices.pieces(k)));
-    if (progress) progress(static_cast<double>(k + 1) / static_cast<double>(slices.count()));
+    progress.step(k + 1, slices.count());
   }
   sequence.dots = walk.take_dots();
   CHECK_EQ(sequence.dots.size(), count);

@@ -231,7 +231,7 @@ DotSequence place_predictively(const ToneField& asked, const ToneField& density,
   if (report) report->texel_count = texels.layout().texel_count();
   const std::vector<float> wanted = predict.wanted(pitch_m, correction.points());
   for (int round = 0; round < options.rounds; ++round) {
-    if (progress) progress(static_cast<double>(round) / options.rounds);
+    progress(static_cast<double>(round) / options.rounds);
     const double rms = correction.take_off(predict.painted(dots, correction.points()), wanted, options.share);
     if (report) report->error_rms.push_back(rms);
     std::vector<float> tones = texels.corrected(correction);

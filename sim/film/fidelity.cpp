@@ -239,7 +239,7 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
                           readings[i].is_reachable = !is_reachable || is_reachable(readings[i].point);
                         }
                       });
-    if (progress) progress(.5 * static_cast<double>(end) / static_cast<double>(readings.size()));
+    progress.part(0, .5).step(end, readings.size());
   }
 
   Fidelity fidelity;
@@ -257,7 +257,7 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
   for (const ViewDirection& direction : measuring_views()) {
     const OrthographicView view(film.mesh(), direction, pixel_m);
     similarity.add(look(film, tone, view), view, film.pitch_m() / pixel_m, reach);
-    if (progress) progress(.5 + .5 * ++seen / 6);
+    progress(.5 + .5 * ++seen / 6);
   }
   fidelity.whole.s2 = similarity.whole();
   fidelity.reachable.s2 = similarity.reachable();

@@ -140,7 +140,7 @@ std::vector<Hit> Film::expose(std::span<const Emission> emissions, const Progres
     tbb::parallel_for(std::size_t{0}, count,
                       [&](std::size_t i) { hits[begin + i] = implementation_->land(emissions[begin + i], spots[i]); });
     implementation_->expose(spots);
-    if (progress) progress(static_cast<double>(begin + count) / emissions.size());
+    progress.step(begin + count, emissions.size());
   }
   return hits;
 }

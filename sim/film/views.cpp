@@ -204,11 +204,11 @@ std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneFi
     const auto [low, high] = bounds(film.mesh());
     const int factor = std::max(1, static_cast<int>(std::ceil((high - low).maxCoeff() / pixel_m / kSheetPixels)));
     small_views.push_back(reduced(view, factor));
-    if (progress) progress(static_cast<double>(files.size()) / 7);
+    progress.step(files.size(), 7);
   }
   files.push_back(folder / "exposure.png");
   save_png(contact_sheet(small_views, paint, skipped_O.size()).picture(), files.back());
-  if (progress) progress(1);
+  progress(1);
   return files;
 }
 
