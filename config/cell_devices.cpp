@@ -10,6 +10,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kSimulated = "simulated";
+constexpr const char* kDobot = "dobot";
+constexpr const char* kModbusAxes = "modbus-axes";
+constexpr const char* kOrientalAz = "oriental-az";
+constexpr const char* kObis = "obis";
+constexpr const char* kCobolt = "cobolt";
+
 struct DeviceContext {
   const CellDescription& cell;
   const fs::path& folder;
@@ -23,7 +30,7 @@ AxisBounds bounds_of(const AxisDescription& axis) {
   return {axis.min, axis.max, axis.speed_max, axis.acceleration_max};
 }
 
-/// sign and offset; steps_per_unit as given, or 1 device unit (degree or millimeter) if `has_steps` is false.
+/// Reads sign and offset; also steps_per_unit if `has_steps`, else the device counts in degrees or millimeters.
 AxisScale read_scale(JsonObject& json, int axis, bool has_steps) {
   const char* unit = is_prismatic(axis) ? "mm" : "deg";
   const double unit_si = is_prismatic(axis) ? 1e-3 : kDegree;
@@ -71,7 +78,7 @@ DobotOptions read_dobot(JsonObject& json, const DeviceContext& context) {
   return options;
 }
 
-/// host and tcp_port, or port, baud and parity.
+/// Reads host and tcp_port, or port, baud and parity.
 ModbusEndpoint read_endpoint(JsonObject& json) {
   ModbusEndpoint endpoint;
   if (json.has("host") == json.has("port"))
@@ -88,7 +95,7 @@ ModbusEndpoint read_endpoint(JsonObject& json) {
   return endpoint;
 }
 
-/// `first`: this group's first among the cell's six axes.
+/// `first`: index of the group's first axis among the cell's six axes.
 template <std::size_t N>
 ModbusGroupOptions<N> read_modbus_group(JsonObject& json, int first, bool is_mapped, const DeviceContext& context) {
   ModbusGroupOptions<N> options;
@@ -119,7 +126,7 @@ ModbusGroupOptions<N> read_modbus_group(JsonObject& json, int first, bool is_map
         entry.homes_to_zero = axis.optional_choice("home", {"absolute", "reference_run"}).value_or(0) == 1;
         for (std::size_t other = 0; other < i; ++other)
           if (options.axes[other].endpoint == entry.endpoint && options.axes[other].unit == entry.unit)
-            axis.refuse("unit", "is that of axis " + std::string(kAxisNames[first + static_cast<int>(other)]) + " too");
+            axis.refuse("unit", "axis " + std::string(kAxisNames[first + static_cast<int>(other)]) + " has it already");
       });
     }
   });
@@ -145,7 +152,7 @@ GateOptions read_gate(JsonObject& json, bool can_be_own, bool has_robot_outputs)
   json.object("gate", [&](JsonObject& entry) {
     gate.is_lasers_own = entry.choice("of", {"robot", "laser"}) == 1;
     if (gate.is_lasers_own && !can_be_own)
-      entry.refuse("of", "this laser has no serial command that is fast enough: gate it by an output of the robot");
+      entry.refuse("of", "this laser has no serial command that is fast enough: use an output of the robot");
     if (gate.is_lasers_own) return;
     if (!has_robot_outputs) entry.refuse("of", "the robot's driver has no digital outputs");
     gate.output = static_cast<int>(entry.integer("output", 1, 24));
@@ -153,61 +160,67 @@ GateOptions read_gate(JsonObject& json, bool can_be_own, bool has_robot_outputs)
   return gate;
 }
 
-/// The driver's name, from a text or from an object's "driver"; `visit` gets the object if it is one.
+/// Reads a driver's name, from a text or from an object's "driver"; `visit` gets the object of a real device.
 template <class Visit>
-std::string read_device(JsonObject& devices, const std::string& key, const std::vector<std::string>& known,
-                        Visit visit) {
-  std::string name;
-  const auto check = [&](JsonObject& at, const std::string& at_key) {
-    for (const std::string& driver : known)
-      if (driver == name) return;
+void read_device(JsonObject& devices, const std::string& key, const std::vector<std::string>& known, Visit visit) {
+  const auto check = [&](JsonObject& at, const std::string& at_key, const std::string& name) {
     std::string all;
-    for (const std::string& driver : known) all += (all.empty() ? "" : ", ") + driver;
+    for (const std::string& driver : known) {
+      if (driver == name) return;
+      all += (all.empty() ? "" : ", ") + driver;
+    }
     at.refuse(at_key, "no driver is called \"" + name + "\"; known: " + all);
   };
   if (devices.is_text(key)) {
-    name = devices.text(key, 100);
-    check(devices, key);
-    if (name != "simulated")
-      devices.refuse(key, "the driver " + name + " needs an object that says where the device is");
-    return name;
+    const std::string name = devices.text(key, 100);
+    check(devices, key, name);
+    if (name != kSimulated)
+      devices.refuse(key, "the driver " + name + " needs an object with the address of the device");
+    return;
   }
   devices.object(key, [&](JsonObject& device) {
-    name = device.text("driver", 100);
-    check(device, "driver");
-    if (name != "simulated") visit(device, name);
+    const std::string name = device.text("driver", 100);
+    check(device, "driver", name);
+    if (name != kSimulated) visit(device, name);
   });
-  return name;
 }
 
 }  // namespace
 
-CellDeviceOptions read_cell_devices(JsonObject& devices, CellDescription& cell, const fs::path& cell_folder) {
+CellDeviceOptions read_cell_devices(JsonObject& devices, const CellDescription& cell, const fs::path& cell_folder) {
   CellDeviceOptions options;
   const DeviceContext context{cell, cell_folder};
-  cell.devices.robot = read_device(devices, "robot", {"simulated", "dobot", "modbus-axes"},
-                                   [&](JsonObject& device, const std::string& driver) {
-                                     if (driver == "dobot")
-                                       options.robot = read_dobot(device, context);
-                                     else
-                                       options.robot = read_modbus_group<4>(device, kJ1, true, context);
-                                   });
-  cell.devices.table = read_device(devices, "table", {"simulated", "oriental-az", "modbus-axes"},
-                                   [&](JsonObject& device, const std::string& driver) {
-                                     options.table =
-                                         read_modbus_group<2>(device, kTilt, driver == "modbus-axes", context);
-                                   });
+  read_device(devices, "robot", {kSimulated, kDobot, kModbusAxes}, [&](JsonObject& device, const std::string& driver) {
+    if (driver == kDobot)
+      options.robot = read_dobot(device, context);
+    else
+      options.robot = read_modbus_group<4>(device, kJ1, true, context);
+  });
+  read_device(devices, "table", {kSimulated, kOrientalAz, kModbusAxes},
+              [&](JsonObject& device, const std::string& driver) {
+                options.table = read_modbus_group<2>(device, kTilt, driver == kModbusAxes, context);
+              });
   const bool has_outputs = std::holds_alternative<DobotOptions>(options.robot);
-  cell.devices.laser = read_device(devices, "laser", {"simulated", "obis", "cobolt"},
-                                   [&](JsonObject& device, const std::string& driver) {
-                                     const LaserOptions laser = read_laser_link(device, context);
-                                     const GateOptions gate = read_gate(device, driver == "cobolt", has_outputs);
-                                     if (driver == "obis")
-                                       options.laser = ObisDevice{laser, gate};
-                                     else
-                                       options.laser = CoboltDevice{laser, gate};
-                                   });
+  read_device(devices, "laser", {kSimulated, kObis, kCobolt}, [&](JsonObject& device, const std::string& driver) {
+    const LaserOptions laser = read_laser_link(device, context);
+    const GateOptions gate = read_gate(device, driver == kCobolt, has_outputs);
+    if (driver == kObis)
+      options.laser = ObisDevice{laser, gate};
+    else
+      options.laser = CoboltDevice{laser, gate};
+  });
   return options;
+}
+
+DriverNames driver_names(const CellDeviceOptions& options) {
+  DriverNames names{kSimulated, kSimulated, kSimulated};
+  if (std::holds_alternative<DobotOptions>(options.robot)) names.robot = kDobot;
+  if (std::holds_alternative<ModbusGroupOptions<4>>(options.robot)) names.robot = kModbusAxes;
+  if (const auto* axes = std::get_if<ModbusGroupOptions<2>>(&options.table))
+    names.table = axes->map ? kModbusAxes : kOrientalAz;
+  if (std::holds_alternative<ObisDevice>(options.laser)) names.laser = kObis;
+  if (std::holds_alternative<CoboltDevice>(options.laser)) names.laser = kCobolt;
+  return names;
 }
 
 }  // namespace hilbrush

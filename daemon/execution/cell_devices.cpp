@@ -42,8 +42,8 @@ std::array<std::unique_ptr<AxisDrive>, N> make_drives(const ModbusGroupOptions<N
     for (std::size_t other = 0; other < i; ++other)
       if (options.axes[other].endpoint == options.axes[i].endpoint) buses[i] = buses[other];
     if (!buses[i]) buses[i] = std::make_shared<ModbusBus>(options.axes[i].endpoint);
-    if (const auto* map = std::get_if<RegisterMap>(&options.map))
-      drives[i] = std::make_unique<MappedDrive>(buses[i], options.axes[i], *map, clock);
+    if (options.map)
+      drives[i] = std::make_unique<MappedDrive>(buses[i], options.axes[i], *options.map, clock);
     else
       drives[i] = std::make_unique<OrientalDrive>(buses[i], options.axes[i]);
   }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "config/cell_devices.h"
 #include "config/cell_file.h"
 #include "daemon/execution/cell_devices.h"
 #include "daemon/server/access.h"
@@ -34,9 +35,7 @@ fs::path made_folder(const fs::path& folder) {
 CellDescription described_cell(const fs::path& file, const std::optional<double>& time_scale) {
   CellDescription description = load_cell(file);
   // A wire has no virtual time: its drivers take 0 for 1.
-  const auto& devices = description.devices;
-  const bool is_simulated =
-      devices.robot == "simulated" && devices.table == "simulated" && devices.laser == "simulated";
+  const bool is_simulated = load_cell_devices(file).is_simulated();
   if (!is_simulated && description.simulation.time_scale <= 0) description.simulation.time_scale = 1;
   if (!time_scale) return description;
   if (!(*time_scale >= 0 && *time_scale <= 1000)) throw InputError("--time-scale", "must be 0 to 1000");

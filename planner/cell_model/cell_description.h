@@ -103,9 +103,6 @@ struct CellDescription {
     double message_s = 0;     ///< what one exchange with the devices costs
     double move_delay_s = 0;  ///< what each move was measured to take longer
   } timing;
-  struct Devices {  ///< driver names
-    std::string robot, table, laser;
-  } devices;
   struct Simulation {
     double time_scale = 0;  ///< wall seconds of one cell second: 1 real time, 0 virtual (as fast as possible)
   } simulation;

@@ -130,7 +130,7 @@ TEST_F(CheckCell, WhatIsUnfitIsNamedAndTheExitCodeTells) {
   CommandResult result = check();
   EXPECT_EQ(result.exit_code, 5) << result.output;
   EXPECT_TRUE(has(result.output, "laser (obis): NOT FIT")) << result.output;
-  EXPECT_TRUE(has(result.output, "the cell file wants ")) << result.output;
+  EXPECT_TRUE(has(result.output, "the cell file says ")) << result.output;
   EXPECT_TRUE(has(result.output, "table (oriental-az): fit")) << result.output;
 
   changed = written;

@@ -73,9 +73,24 @@ TEST(CellDevices, RealDevicesAreReadInTheCellsUnits) {
   const auto& obis = std::get<ObisDevice>(options.laser);
   EXPECT_EQ(obis.laser.port, "tcp://10.0.0.7:4001");
   EXPECT_EQ(obis.gate.output, 3);
-  const CellDescription cell = cell_from_json(json.dump(), "");
-  EXPECT_EQ(cell.devices.robot, "dobot");
-  EXPECT_EQ(cell.devices.laser, "obis");
+}
+
+TEST(CellDevices, DriversAreCalledAsTheFileCallsThem) {
+  const auto names = [](const char* devices) {
+    const DriverNames drivers = driver_names(cell_devices_from_json(cell_with(devices).dump(), ""));
+    return std::string(drivers.robot) + " " + drivers.table + " " + drivers.laser;
+  };
+  EXPECT_EQ(names(R"({"robot": "simulated", "table": "simulated", "laser": "simulated"})"),
+            "simulated simulated simulated");
+  EXPECT_EQ(names(kReal), "dobot oriental-az obis");
+  EXPECT_EQ(names(R"({
+    "robot": {"driver": "modbus-axes", "map": "cia402", "host": "10.0.0.6",
+              "axes": {"j1": {"unit": 1, "steps_per_deg": 100}, "j2": {"unit": 2, "steps_per_deg": 100},
+                       "j3": {"unit": 3, "steps_per_mm": 100}, "j4": {"unit": 4, "steps_per_deg": 100}}},
+    "table": {"driver": "modbus-axes", "map": "leadshine-pr", "port": "/dev/ttyUSB0",
+              "axes": {"a": {"unit": 1, "steps_per_deg": 100}, "c": {"unit": 2, "steps_per_deg": 100}}},
+    "laser": {"driver": "cobolt", "port": "/dev/ttyACM0", "gate": {"of": "laser"}}})"),
+            "modbus-axes modbus-axes cobolt");
 }
 
 TEST(CellDevices, RefusalsNameTheirPlace) {
