@@ -24,7 +24,7 @@ constexpr std::size_t kTonePointsMax = 1001;
 AxisDescription read_axis(JsonObject& json, AxisIndex axis) {
   const bool is_linear = axis == kJ3;
   const std::string unit = is_linear ? "_mm" : "_deg";
-  // A rotary table may wind up many turns, the arm's joints turn about once.
+  // The rotary table may turn many times, a joint of the arm about once.
   const double travel = is_linear ? 2000 : axis == kRotation ? 36000 : 720;
   const double speed = is_linear ? 10000 : 20000;
   AxisDescription description;
@@ -48,10 +48,10 @@ void read_arm(JsonObject& json, CellDescription::Arm& arm) {
   arm.quill_radius_m = json.quantity("quill_radius_mm", {0, 500});
 }
 
-/// Unless the file says how high it is, the column ends where the upper arm begins.
+/// The column ends below the upper arm unless the file gives its height.
 void read_column(JsonObject& json, CellDescription::Arm& arm) {
   if (!json.has("column_radius_mm")) {
-    if (json.has("column_height_mm")) json.refuse("column_height_mm", "has no column_radius_mm beside it");
+    if (json.has("column_height_mm")) json.refuse("column_height_mm", "needs column_radius_mm too");
     return;
   }
   arm.column.radius_m = json.quantity("column_radius_mm", {0, 2000});
@@ -59,7 +59,8 @@ void read_column(JsonObject& json, CellDescription::Arm& arm) {
                                                      : std::max(0., arm.upper_link.height_m - arm.upper_link.radius_m);
 }
 
-/// The links run above all that the lens can reach, unless the file says where, and the quill ends in the forearm.
+/// The links run above the highest position of the lens unless the file gives their height; the quill ends in the
+/// forearm.
 void read_links(JsonObject& json, const AxisDescription& j3, const CellDescription::Lens& lens,
                 CellDescription::Arm& arm) {
   constexpr double kRadiusM = .035, kGapM = .03;
@@ -126,8 +127,8 @@ ToneCurveEntry read_tone_curve(JsonObject& json, double asked_max) {
   entry.asked = json.numbers("asked", entry.wanted.size(), entry.wanted.size(), {0, asked_max});
   if (entry.wanted.front() != 0 || entry.wanted.back() != 1) json.refuse("wanted", "does not go from 0 to 1");
   if (std::adjacent_find(entry.wanted.begin(), entry.wanted.end(), std::greater_equal<>()) != entry.wanted.end())
-    json.refuse("wanted", "does not rise from each number to the next");
-  if (!std::is_sorted(entry.asked.begin(), entry.asked.end())) json.refuse("asked", "falls somewhere");
+    json.refuse("wanted", "must increase from each number to the next");
+  if (!std::is_sorted(entry.asked.begin(), entry.asked.end())) json.refuse("asked", "must not decrease");
   return entry;
 }
 
@@ -159,7 +160,7 @@ void read_timing(JsonObject& json, CellDescription::Timing& timing) {
   if (timing.settle_min_s > timing.settle_max_s) json.refuse("settle_max_ms", "below settle_min_ms");
 }
 
-/// What jobs report in `timing.measured`.
+/// Reads what jobs report in `timing.measured`.
 void read_measured(JsonObject& json, CellDescription& cell) {
   if (json.has("move_delay_ms")) cell.timing.move_delay_s = json.quantity("move_delay_ms", {0, 10000});
   if (!json.has("time_factor")) return;
@@ -196,7 +197,7 @@ CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOp
   return cell;
 }
 
-/// The folder that holds the shipped cells. The environment is read here because no setting is known yet when a cell is
+/// The folder with the shipped cells. It comes from the environment because no settings are read yet when a cell is
 /// looked for.
 fs::path cells_folder() {
   if (const char* folder = std::getenv("HILBRUSH_CELLS"); folder != nullptr && *folder != '\0') return folder;
@@ -245,7 +246,8 @@ std::vector<std::string> cell_warnings(const CellDescription& cell) {
     out << value;
     return out.str();
   };
-  // Measured: at 1.0 dark areas stay unfilled, at 2.0 detail is lost in saturated paint; 1.41 is best.
+  // Measured on simulated film: at 1.0 pitches dark areas stay unfilled, at 2.0 detail is lost in saturated paint;
+  // 1.41 is best.
   const double pitches = cell.laser.spot_pitches;
   if (!cell.laser.spot_diameter_m && (pitches < 1.2 || pitches > 1.8))
     warn("$.laser.spot_pitches",
@@ -295,14 +297,16 @@ fs::path find_cell(const std::string& name) {
 
 namespace {
 
-/// Of the curves for this placement the one with the nearest spot; null if there is none.
+/// The curve for this placement with the nearest spot; null if there is none.
 const ToneCurveEntry* find_tone_curve(const CellDescription::Paint& paint, const ToneCurveUse& use) {
   const ToneCurveEntry* best = nullptr;
   double best_off = 0;
   for (const ToneCurveEntry& entry : paint.tone_curves) {
     if (entry.sampler != use.sampler || entry.curve != use.curve || entry.levels != use.levels) continue;
     const double off = entry.spot_pitches && use.spot_pitches ? std::abs(*entry.spot_pitches - *use.spot_pitches) : 0;
-    if (best == nullptr || off < best_off) best = &entry, best_off = off;
+    if (best != nullptr && off >= best_off) continue;
+    best = &entry;
+    best_off = off;
   }
   return best;
 }
@@ -314,46 +318,53 @@ std::string describe(const ToneCurveUse& use) {
   return text;
 }
 
-constexpr double kSpotTolerance = .1;
+/// The curve of the same sampler and levels on the other space-filling curve, or null. Laminar slices are no such
+/// curve.
+const ToneCurveEntry* find_similar_tone_curve(const CellDescription::Paint& paint, ToneCurveUse use) {
+  if (use.curve == "laminar") return nullptr;
+  for (const char* curve : {"hilbert", "peano2"}) {
+    use.curve = curve;
+    if (const ToneCurveEntry* found = find_tone_curve(paint, use)) return found;
+  }
+  return nullptr;
+}
+
+constexpr double kSpotTolerance = .1;  ///< as a share; below this the error of the tones is not measurable
+
+bool is_for_another_spot(const ToneCurveEntry& entry, const ToneCurveUse& use) {
+  return entry.spot_pitches && use.spot_pitches &&
+         std::abs(*entry.spot_pitches / *use.spot_pitches - 1) > kSpotTolerance;
+}
+
+std::string missing_curve_warning(const ToneCurveUse& use, const ToneCurveEntry* similar) {
+  return "the cell file has no tone curve for " + describe(use) +
+         (similar == nullptr ? ": tones will be off" : ", that on curve \"" + similar->curve + "\" is used") +
+         "; `hilbrush calibrate` makes one";
+}
+
+std::string other_spot_warning(const ToneCurveUse& use, const ToneCurveEntry& entry) {
+  std::ostringstream text;
+  text << "the tone curve for " << describe(use) << " was made for a spot of " << *entry.spot_pitches
+       << " pitches, and at this pitch it has " << *use.spot_pitches
+       << ": tones will be off; `hilbrush calibrate --dpi` makes one";
+  return text.str();
+}
 
 }  // namespace
 
-ToneOptions tone_options(const CellDescription& cell, const ToneCurveUse& use, std::string& warning) {
-  ToneOptions options;
-  options.reflectance_white = cell.paint.reflectance_white;
-  options.reflectance_black = cell.paint.reflectance_black;
-  warning.clear();
+CellTone cell_tone(const CellDescription& cell, const ToneCurveUse& use) {
+  CellTone tone;
+  tone.options.reflectance_white = cell.paint.reflectance_white;
+  tone.options.reflectance_black = cell.paint.reflectance_black;
   const ToneCurveEntry* found = find_tone_curve(cell.paint, use);
   if (found == nullptr) {
-    const std::string none = "the cell file has no tone curve for " + describe(use);
-    if (use.curve != "laminar") {
-      ToneCurveUse other = use;
-      for (const char* curve : {"hilbert", "peano2"}) {
-        other.curve = curve;
-        if (found == nullptr) found = find_tone_curve(cell.paint, other);
-      }
-    }
-    warning = none + (found == nullptr ? ": tones will be off" : ", that on curve \"" + found->curve + "\" is used") +
-              "; `hilbrush calibrate` makes one";
+    found = find_similar_tone_curve(cell.paint, use);
+    tone.warning = missing_curve_warning(use, found);
+  } else if (is_for_another_spot(*found, use)) {
+    tone.warning = other_spot_warning(use, *found);
   }
-  if (found == nullptr) return options;
-  options.curve = {found->wanted, found->asked};
-  if (found->spot_pitches && use.spot_pitches &&
-      std::abs(*found->spot_pitches / *use.spot_pitches - 1) > kSpotTolerance && warning.empty()) {
-    std::ostringstream text;
-    text << "the tone curve for " << describe(use) << " was made for a spot of " << *found->spot_pitches
-         << " pitches, and at this pitch it has " << *use.spot_pitches
-         << ": tones will be off; `hilbrush calibrate --dpi` makes one";
-    warning = text.str();
-  }
-  return options;
-}
-
-ToneOptions tone_options(const CellDescription& cell, const std::string& sampler, bool* is_calibrated) {
-  std::string warning;
-  ToneOptions options = tone_options(cell, {.sampler = sampler}, warning);
-  if (is_calibrated != nullptr) *is_calibrated = warning.empty();
-  return options;
+  if (found != nullptr) tone.options.curve = {found->wanted, found->asked};
+  return tone;
 }
 
 }  // namespace hilbrush

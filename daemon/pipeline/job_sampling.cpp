@@ -5,19 +5,18 @@
 #include <fstream>
 #include <limits>
 
-#include "config/cell_file.h"
 #include "sampling/tone/levels.h"
 
 namespace hilbrush {
 namespace {
 
-/// Dot, pose, exposure, film and pictures, measured on dry runs from 0.1 to 1 million dots.
-constexpr double kBytesADot = 512;
-/// Dots are numbered with 32 bits in programs and films.
+/// For dot, pose, exposure, film and pictures; measured on dry runs from 0.1 to 1 million dots.
+constexpr double kBytesPerDot = 512;
+/// Programs and films number dots with 32 bits.
 constexpr std::uint64_t kMaxDots = std::numeric_limits<std::uint32_t>::max();
 
-/// The pitch before the dots are placed. A job that names their number has about sqrt(area / count) by half tones; the
-/// spot of few cells is given in millimeters, and of those the curve is chosen by it within a tenth.
+/// The pitch before the dots are placed. For a job that gives the number of dots it is estimated as if the tone were
+/// one half everywhere. It only chooses the tone curve, on cells whose spot is given in millimeters.
 double expected_pitch_m(const JobSettings& settings, const TexturedMesh& mesh) {
   const SampleOptions options = sample_options(settings);
   if (options.pitch_m) return *options.pitch_m;
@@ -30,21 +29,18 @@ Sampler calibrated_sampler(Sampler sampler) {
   return sampler == Sampler::kFine ? Sampler::kCentroid : sampler;
 }
 
-ToneOptions job_tone_options(const CellDescription& cell, const JobSettings& settings, const TexturedMesh& mesh,
-                             std::string& warning) {
+CellTone job_tone(const CellDescription& cell, const JobSettings& settings, const TexturedMesh& mesh) {
   const double pitch_m = expected_pitch_m(settings, mesh);
-  ToneOptions options = tone_options(cell,
-                                     {.sampler = sampler_name(calibrated_sampler(settings.sampler)),
-                                      .curve = curve_name(settings.curve),
-                                      .levels = settings.levels,
-                                      .spot_pitches = spot_diameter_m(cell, pitch_m) / pitch_m},
-                                     warning);
-  options.untextured = settings.untextured;
+  CellTone tone = cell_tone(cell, {.sampler = sampler_name(calibrated_sampler(settings.sampler)),
+                                   .curve = curve_name(settings.curve),
+                                   .levels = settings.levels,
+                                   .spot_pitches = spot_diameter_m(cell, pitch_m) / pitch_m});
+  tone.options.untextured = settings.untextured;
   if (settings.tone_curve == ToneMapping::kLinear) {
-    options.curve = {{0, 1}, {0, cell.paint.asked_max}};
-    warning.clear();
+    tone.options.curve = {{0, 1}, {0, cell.paint.asked_max}};
+    tone.warning.clear();
   }
-  return options;
+  return tone;
 }
 
 PictureOptions picture_options(const CellDescription& cell, const JobSettings& settings) {
@@ -69,7 +65,7 @@ std::uint64_t dot_limit_by_memory() {
   double kilobytes = 0;
   while (in >> key >> kilobytes) {
     if (key == "MemAvailable:")
-      return static_cast<std::uint64_t>(std::min(kilobytes * 1024 / kBytesADot, static_cast<double>(kMaxDots)));
+      return static_cast<std::uint64_t>(std::min(kilobytes * 1024 / kBytesPerDot, static_cast<double>(kMaxDots)));
     std::getline(in, unit);
   }
   return kMaxDots;

@@ -121,9 +121,9 @@ struct Workpiece {
     report.mesh.faces = mesh.triangle_count();
     report.mesh.area_m2 = mesh.area_m2();
 
-    std::string warning;
-    tone_options = job_tone_options(cell, settings, mesh, warning);
-    if (!warning.empty()) report.mesh.warnings.push_back(warning);
+    const CellTone cell_tone = job_tone(cell, settings, mesh);
+    tone_options = cell_tone.options;
+    if (!cell_tone.warning.empty()) report.mesh.warnings.push_back(cell_tone.warning);
     for (const auto& sentence : report.mesh.warnings) stages.warn(sentence);
     tone.emplace(mesh, tone_options);
   }
@@ -274,10 +274,8 @@ void develop_and_judge(Workpiece& piece, const Reach& reach, const PlannedWork& 
     const ReachTest is_reachable = [&](const SurfacePoint& point) {
       return reach.is_reachable(position(piece.mesh, point), face_normal(piece.mesh, point));
     };
-    report.fidelity =
-        measure_fidelity(film, *piece.tone, is_reachable, piece.settings.seed, [&](double f) { progress(.5 * f); });
-    return write_pictures(film, *piece.tone, positions_of_unexposed(work.dots, program), output,
-                          [&](double f) { progress(.5 + .5 * f); });
+    report.fidelity = measure_fidelity(film, *piece.tone, is_reachable, piece.settings.seed, progress.part(0, .5));
+    return write_pictures(film, *piece.tone, positions_of_unexposed(work.dots, program), output, progress.part(.5, 1));
   });
   for (const auto& file : files) report.files.push_back(std::filesystem::relative(file, output).string());
 }

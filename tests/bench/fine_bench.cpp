@@ -64,7 +64,7 @@ void run(const std::string& model_file, double size_mm, double dpi, const std::v
   PlacementOptions placement;
   placement.size_m = size_mm * 1e-3;
   const RepairedMesh repaired = repair_mesh(place_on_table(load_model(model_file, load_image_file), placement));
-  const ToneField tone(repaired.mesh, tone_options(cell, "centroid"));
+  const ToneField tone(repaired.mesh, cell_tone(cell, {.sampler = "centroid"}).options);
   const SurfaceCurve curve(repaired.mesh);
   SampleOptions options;
   options.pitch_m = 25.4e-3 / dpi;

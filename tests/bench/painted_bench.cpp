@@ -67,18 +67,15 @@ class Workpiece {
     settings.dpi = dpi;
     const double pitch_m = .0254 / dpi;
     const std::string sampler = settings.sampler == Sampler::kFine ? "centroid" : sampler_name(settings.sampler);
-    std::string warning;
-    ToneOptions options = tone_options(cell_,
-                                       {.sampler = sampler,
-                                        .curve = curve_name(settings.curve),
-                                        .levels = settings.levels,
-                                        .spot_pitches = spot_diameter_m(cell_, pitch_m) / pitch_m},
-                                       warning);
-    if (!warning.empty()) std::fprintf(stderr, "painted_bench: %s\n", warning.c_str());
-    options.untextured = Untextured::kMaterial;
+    CellTone tone = cell_tone(cell_, {.sampler = sampler,
+                                      .curve = curve_name(settings.curve),
+                                      .levels = settings.levels,
+                                      .spot_pitches = spot_diameter_m(cell_, pitch_m) / pitch_m});
+    if (!tone.warning.empty()) std::fprintf(stderr, "painted_bench: %s\n", tone.warning.c_str());
+    tone.options.untextured = Untextured::kMaterial;
 
     Painted painted;
-    painted.tone.emplace(mesh_, options);
+    painted.tone.emplace(mesh_, tone.options);
     PictureOptions picture;
     picture.sample = sample_options(settings);
     picture.curve = settings.curve;
@@ -90,7 +87,7 @@ class Workpiece {
     };
     const double begin = cpu_s();
     const DotSequence dots =
-        place_picture(curve_, *painted.tone, options, picture, film_predictor(cell_, *painted.tone));
+        place_picture(curve_, *painted.tone, tone.options, picture, film_predictor(cell_, *painted.tone));
     painted.cpu = cpu_s() - begin;
     painted.dot_count = dots.dots.size();
     Sha256 hash;

@@ -68,7 +68,7 @@ void run(const std::string& model_file, double size_mm, double dpi, Stopwatch& w
 
   const Model model = watch.time("load", [&] { return load_model(model_file, load_image_file); });
   const RepairedMesh repaired = watch.time("repair", [&] { return repair_mesh(place_on_table(model, placement)); });
-  const ToneField tone(repaired.mesh, tone_options(cell, sampler_name(settings.sampler)));
+  const ToneField tone(repaired.mesh, cell_tone(cell, {.sampler = sampler_name(settings.sampler)}).options);
   const SurfaceCurve curve = watch.time("curve", [&] { return SurfaceCurve(repaired.mesh); });
   SampleReport report;
   const DotSequence dots =

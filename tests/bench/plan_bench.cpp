@@ -107,7 +107,7 @@ struct Bench {
     return repair_mesh(place_on_table(load_model(model, load_image_file), placement)).mesh;
   }
   DotSequence dots(const Row& row, std::uint64_t count) const {
-    const ToneField tone(mesh, tone_options(cell, sampler_name(row.sampler)));
+    const ToneField tone(mesh, cell_tone(cell, {.sampler = sampler_name(row.sampler)}).options);
     SampleOptions options;
     options.dot_count = count;
     options.sampler = row.sampler;

@@ -203,8 +203,8 @@ TEST(CellFile, ValuesThatContradictEachOtherAreRefused) {
        "expected a number from -5000 to 5000, found \"x\""},
       {"/paint/tone_curves", with("wanted", {0, .5, .9}), "$.paint.tone_curves[0].wanted", "does not go from 0 to 1"},
       {"/paint/tone_curves", with("wanted", {0, 1, 1}), "$.paint.tone_curves[0].wanted",
-       "does not rise from each number to the next"},
-      {"/paint/tone_curves", with("asked", {0, 1.2, 1.1}), "$.paint.tone_curves[0].asked", "falls somewhere"},
+       "must increase from each number to the next"},
+      {"/paint/tone_curves", with("asked", {0, 1.2, 1.1}), "$.paint.tone_curves[0].asked", "must not decrease"},
       {"/paint/tone_curves", with("asked", {0, 1}), "$.paint.tone_curves[0].asked",
        "expected a list of 3 numbers, found a list of 2"},
       {"/paint/tone_curves", with("asked", {0, 1, 2.1}), "$.paint.tone_curves[0].asked[2]",
@@ -229,20 +229,20 @@ TEST(CellFile, SpotDiameterReplacesSpotPitches) {
   EXPECT_EQ(cell.laser.spot_diameter_m, .3 / 1e3);
 }
 
-TEST(CellFile, ToneOptionsTakeTheCurveOfTheSampler) {
+TEST(CellFile, ToneIsByTheCurveOfTheSampler) {
   Json json = Json::parse(default_text());
   json["paint"]["reflectance_white"] = .9;
   json["paint"]["reflectance_black"] = .1;
   json["paint"]["tone_curves"] = {{{"sampler", "even"}, {"wanted", {0, 1}}, {"asked", {0, 1.5}}}};
   const CellDescription cell = cell_from_json(json.dump(), "");
-  bool is_calibrated = true;
-  EXPECT_TRUE(tone_options(cell, "centroid", &is_calibrated).curve.wanted.empty());
-  EXPECT_FALSE(is_calibrated);
-  const ToneOptions even = tone_options(cell, "even", &is_calibrated);
-  EXPECT_TRUE(is_calibrated);
-  EXPECT_EQ(even.curve.asked, (std::vector<double>{0, 1.5}));
-  EXPECT_EQ(even.reflectance_white, .9);
-  EXPECT_EQ(even.reflectance_black, .1);
+  const CellTone centroid = cell_tone(cell, {.sampler = "centroid"});
+  EXPECT_TRUE(centroid.options.curve.wanted.empty());
+  EXPECT_NE(centroid.warning, "");
+  const CellTone even = cell_tone(cell, {.sampler = "even"});
+  EXPECT_EQ(even.warning, "");
+  EXPECT_EQ(even.options.curve.asked, (std::vector<double>{0, 1.5}));
+  EXPECT_EQ(even.options.reflectance_white, .9);
+  EXPECT_EQ(even.options.reflectance_black, .1);
 }
 
 TEST(CellFile, ToneCurvesAreChosenByPlacementLevelsAndSpot) {
@@ -257,9 +257,9 @@ TEST(CellFile, ToneCurvesAreChosenByPlacementLevelsAndSpot) {
   const CellDescription cell = cell_from_json(json.dump(), "");
   std::string warning;
   const auto black = [&](const char* sampler, const char* curve, int levels, double spot) {
-    const ToneCurve tone =
-        tone_options(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = spot}, warning).curve;
-    return tone.asked.empty() ? 0 : tone.asked.back();
+    const CellTone tone = cell_tone(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = spot});
+    warning = tone.warning;
+    return tone.options.curve.asked.empty() ? 0 : tone.options.curve.asked.back();
   };
   EXPECT_EQ(black("centroid", "hilbert", 1, 1.41), 1.1);
   EXPECT_EQ(warning, "");
@@ -281,14 +281,12 @@ TEST(CellFile, TheShippedCellIsCalibratedForAllThatAJobCanName) {
   for (const char* sampler :
        {"centroid", "jittered", "even", "random", "halton", "hammersley", "sobol", "niederreiter", "blue"})
     for (const char* curve : {"hilbert", "peano2"})
-      for (int levels = 1; levels <= 4; ++levels) {
-        std::string warning;
-        tone_options(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = 1.41}, warning);
-        EXPECT_EQ(warning, "") << sampler << " on " << curve << ' ' << levels;
-      }
-  std::string warning;
-  tone_options(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}, warning);
-  EXPECT_EQ(warning, "");
+      for (int levels = 1; levels <= 4; ++levels)
+        EXPECT_EQ(cell_tone(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = 1.41}).warning,
+                  "")
+            << sampler << " on " << curve << ' ' << levels;
+  EXPECT_EQ(cell_tone(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}).warning,
+            "");
 }
 
 TEST(CellFile, WarningsNameWhatIsAllowedButOdd) {

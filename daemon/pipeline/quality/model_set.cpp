@@ -119,8 +119,7 @@ class DotsSet : public MeasuredSet {
     return with_curvature_density(repaired.mesh, settings.density);
   }
   static ToneOptions tone_of(const JobSettings& settings, const TexturedMesh& mesh) {
-    std::string warning;  // said when the job was planned
-    return job_tone_options(load_cell(find_cell(settings.cell)), settings, mesh, warning);
+    return job_tone(load_cell(find_cell(settings.cell)), settings, mesh).options;  // it warned when it was planned
   }
 
   /// Gives the dots back their triangles, and refuses a model that they do not lie on.
