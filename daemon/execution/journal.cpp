@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "sampling/base/check.h"
+#include "sampling/base/random.h"
 
 namespace hilbrush {
 namespace {
@@ -37,18 +38,10 @@ struct Boot {
 constexpr std::size_t kBootPlace = kPage, kTables = 2 * kPage;
 static_assert(sizeof(Header) <= kPage && sizeof(Boot) <= kPage);
 
-/// splitmix64's finaliser: every input bit reaches every output bit.
-std::uint64_t mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
-
 /// A record: the state in the low byte, 56 bits of checksum over state, place and table above it. All-zero storage is
 /// no valid record.
 std::uint64_t make_record(std::uint64_t table_seed, std::size_t place, std::uint8_t state) {
-  return (mix(mix(table_seed ^ place) + state) << 8 | state);
+  return (splitmix64(splitmix64(table_seed ^ place) + state) << 8 | state);
 }
 
 std::optional<std::uint8_t> record_state(std::uint64_t table_seed, std::size_t place, std::uint64_t record) {
@@ -66,7 +59,7 @@ template <class Block>
 std::uint64_t block_checksum(const Block& block) {
   const auto* bytes = reinterpret_cast<const unsigned char*>(&block);
   std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < offsetof(Block, checksum); ++i) sum = mix(sum ^ bytes[i]);
+  for (std::size_t i = 0; i < offsetof(Block, checksum); ++i) sum = splitmix64(sum ^ bytes[i]);
   return sum;
 }
 

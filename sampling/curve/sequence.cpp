@@ -3,19 +3,13 @@
 #include <algorithm>
 
 #include "sampling/base/check.h"
+#include "sampling/base/random.h"
 
 namespace hilbrush {
 namespace {
 
 /// The thesis drops as many of Sobol's and Niederreiter's numbers "to avoid the leading zeros phenomenon".
 constexpr std::uint64_t kDropped = 100;
-
-/// Finalizer of SplitMix64 (Steele, Lea, Flood 2014).
-std::uint64_t mix(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
 
 constexpr std::uint64_t low_bits(int count) {
   return (std::uint64_t{1} << count) - 1;
@@ -84,8 +78,7 @@ double ranked_gray(const Range& range, std::uint64_t index) {
 }  // namespace
 
 double uniform_number(std::uint64_t seed, std::uint64_t index) {
-  const std::uint64_t golden = 0x9e3779b97f4a7c15u;
-  return static_cast<double>(mix(mix(seed + golden) + golden * (index + 1)) >> 11) * 0x1p-53;
+  return unit_interval(mix_bits(splitmix64(seed) + kGoldenGamma * (index + 1)));
 }
 
 double radical_inverse_2(std::uint64_t k) {

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "sampling/base/random.h"
 #include "sim/film/masked_image.h"
 #include "sim/film/orthographic_view.h"
 #include "sim/film/picture_means.h"
@@ -28,12 +29,9 @@ struct Reading {
   std::array<PictureMeans, 2> means;  ///< of sigma 1 and 2 pitches
 };
 
-/// SplitMix64 (Steele et al. 2014) as a hash: independent numbers for each (seed, index), whatever thread asks.
+/// A hash: independent numbers for each (seed, index), whatever thread asks.
 double uniform(std::uint64_t seed, std::uint64_t index) {
-  std::uint64_t z = seed * 0x9E3779B97F4A7C15u + (index + 1) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+  return unit_interval(mix_bits(seed * kGoldenGamma + (index + 1) * 0xBF58476D1CE4E5B9u));
 }
 
 /// One point in each of kSampleCount strata of equal area, which follow the order of the triangles.

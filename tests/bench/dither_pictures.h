@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sampling/base/input_error.h"
+#include "sampling/base/random.h"
 #include "sampling/images/image_file.h"
 
 /// Pictures that dithering is tried on: wanted coverage, 0 white to 1 black, in linear light.
@@ -46,11 +47,8 @@ inline Original zone_plate() {
 
 /// A pseudo-random number of a lattice point, 0..1.
 inline double lattice_number(int x, int y) {
-  std::uint64_t z =
-      static_cast<std::uint32_t>(x) * 0x9E3779B97F4A7C15u + static_cast<std::uint32_t>(y) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+  return unit_interval(
+      mix_bits(static_cast<std::uint32_t>(x) * kGoldenGamma + static_cast<std::uint32_t>(y) * 0xBF58476D1CE4E5B9u));
 }
 
 inline double smooth_noise(double x, double y) {
