@@ -8,6 +8,7 @@
 #include <queue>
 #include <utility>
 
+#include "sampling/base/union_find.h"
 #include "sampling/disk/refine.h"
 
 namespace hilbrush {
@@ -129,20 +130,11 @@ std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& dista
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.length > b.length; });
-  std::vector<std::uint32_t> parent(disk.faces().size());
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto find = [&](std::uint32_t f) {
-    while (parent[f] != f) f = parent[f] = parent[parent[f]];
-    return f;
-  };
+  UnionFind sets(disk.faces().size());
   std::vector<TriangleSide> closing;
   for (const Candidate& candidate : candidates) {
-    const std::uint32_t a = find(candidate.side.triangle);
-    const std::uint32_t b = find(disk.neighbors()[candidate.side.triangle][candidate.side.side].triangle);
-    if (a != b)
-      parent[a] = b;
-    else
-      closing.push_back(candidate.side);
+    const std::uint32_t across = disk.neighbors()[candidate.side.triangle][candidate.side.side].triangle;
+    if (!sets.unite(candidate.side.triangle, across)) closing.push_back(candidate.side);
   }
   return closing;
 }

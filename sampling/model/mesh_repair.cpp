@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "sampling/base/input_error.h"
+#include "sampling/base/union_find.h"
 #include "sampling/model/edges.h"
 #include "sampling/model/renumber.h"
 
@@ -61,22 +61,17 @@ std::optional<int> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
 /// Gives the ends of collapsed sides one position, so that what hung together over such a triangle still does: poles
 /// whose vertices differ by rounding. Returns whether there were any.
 bool close_collapsed_sides(TexturedMesh& mesh) {
-  std::vector<std::uint32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto find = [&](std::uint32_t v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
+  UnionFind positions(mesh.vertices.size());
   bool is_any = false;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (const auto k = collapsed_side(mesh, t)) {
       const auto i = static_cast<std::size_t>(*k);
-      const std::uint32_t a = find(mesh.triangles[t][i]), b = find(mesh.triangles[t][(i + 1) % 3]);
-      parent[std::max(a, b)] = std::min(a, b);
+      positions.unite(mesh.triangles[t][i], mesh.triangles[t][(i + 1) % 3]);
       is_any = true;
     }
   if (is_any)
-    for (std::uint32_t v = 0; v < parent.size(); ++v) mesh.vertices[v] = Eigen::Vector3d(mesh.vertices[find(v)]);
+    for (std::uint32_t v = 0; v < positions.size(); ++v)
+      mesh.vertices[v] = Eigen::Vector3d(mesh.vertices[positions.root(v)]);
   return is_any;
 }
 
@@ -312,30 +307,21 @@ std::size_t turn_closed_parts_outwards(const TexturedMesh& mesh, Orientation& or
 
 /// Gives every fan of triangles that hang together around a vertex a vertex of its own. Returns how many were added.
 std::size_t split_vertices(TexturedMesh& mesh, const Neighbors& partners) {
-  std::vector<std::uint32_t> parent(3 * mesh.triangle_count());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&](std::uint32_t c) {
-    while (parent[c] != c) c = parent[c] = parent[parent[c]];
-    return c;
-  };
-  const auto unite = [&](std::uint32_t a, std::uint32_t b) {
-    a = find(a), b = find(b);
-    parent[std::max(a, b)] = std::min(a, b);
-  };
+  UnionFind fans(3 * mesh.triangle_count());
   for (std::uint32_t t = 0; t < partners.size(); ++t)
     for (std::uint32_t s = 0; s < 3; ++s) {
       const TriangleSide other = partners[t][s];
       if (other == kNoSide || other.triangle < t) continue;
       const std::uint32_t o = 3 * other.triangle;
-      unite(3 * t + s, o + (other.side + 1u) % 3);
-      unite(3 * t + (s + 1) % 3, o + other.side);
+      fans.unite(3 * t + s, o + (other.side + 1u) % 3);
+      fans.unite(3 * t + (s + 1) % 3, o + other.side);
     }
   std::vector<char> is_taken(mesh.vertices.size(), 0);
-  std::vector<std::uint32_t> vertex_of_root(parent.size());
+  std::vector<std::uint32_t> vertex_of_root(fans.size());
   std::size_t added = 0;
-  for (std::uint32_t c = 0; c < parent.size(); ++c) {
+  for (std::uint32_t c = 0; c < fans.size(); ++c) {
     std::uint32_t& v = mesh.triangles[c / 3][c % 3];
-    const std::uint32_t root = find(c);
+    const std::uint32_t root = fans.root(c);
     if (root == c) {
       vertex_of_root[c] = v;
       if (is_taken[v]) {

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#include "sampling/base/union_find.h"
 
 namespace hilbrush {
 namespace {
@@ -28,22 +29,16 @@ struct Place {
 
 /// By triangle, which of the parts that hang together it belongs to, in order of their first triangles.
 std::vector<std::uint32_t> parts_of(const TexturedMesh& mesh) {
-  std::vector<std::uint32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&](std::uint32_t v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const auto& corners : mesh.triangles)
-    for (const std::size_t c : {1, 2}) {
-      const std::uint32_t a = find(corners[0]), b = find(corners[c]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+  UnionFind sets(mesh.vertices.size());
+  for (const auto& corners : mesh.triangles) {
+    sets.unite(corners[0], corners[1]);
+    sets.unite(corners[0], corners[2]);
+  }
   std::vector<std::uint32_t> number(mesh.vertices.size(), kUnnumbered), parts;
   parts.reserve(mesh.triangle_count());
   std::uint32_t count = 0;
   for (const auto& corners : mesh.triangles) {
-    std::uint32_t& part = number[find(corners[0])];
+    std::uint32_t& part = number[sets.root(corners[0])];
     if (part == kUnnumbered) part = count++;
     parts.push_back(part);
   }
