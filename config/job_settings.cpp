@@ -6,6 +6,7 @@
 
 #include "config/json_reader.h"
 #include "sampling/base/angles.h"
+#include "sampling/base/sha256.h"
 
 namespace hilbrush {
 namespace {
@@ -27,7 +28,7 @@ const std::vector<std::string> kPlanningNames{"quality", "balanced", "fast"};
 const std::vector<std::string> kOrderNames{"improved", "curve"};
 const std::vector<std::string> kPolicyNames{"search", "follow_normal"};
 
-/// How many dots and how large: of each pair at most one.
+/// How many dots, and how large the object: of each pair at most one.
 void read_amounts(JsonObject& json, JobSettings& settings) {
   settings.dpi = json.optional_number("dpi", {10, 1200});
   settings.dots = json.optional_integer("dots", 1, kDotsMax);
@@ -97,7 +98,7 @@ void read_sampling(JsonObject& json, JobSettings& settings) {
     json.refuse("largest_gap_pitches", "contradicts dots: filling holes adds to their number");
   if (settings.curve != CurveKind::kLaminar) return;
   if (settings.sampler != Sampler::kCentroid)
-    json.refuse("sampler", "laminar slices place their dots in one way only: leave sampler out");
+    json.refuse("sampler", "laminar slices have only one way to place dots: leave sampler out");
   if (settings.largest_gap_pitches) json.refuse("largest_gap_pitches", "laminar slices have no strata to fill");
 }
 
@@ -131,7 +132,7 @@ JobSettings job_settings_from_json(const std::string& text, const std::string& o
 }
 
 std::string job_settings_to_json(const JobSettings& settings) {
-  // What stands in for an unset dpi is written out, so that equal jobs have equal text.
+  // The default dpi is written out, so that equal jobs have equal text.
   const std::optional<double> dpi = settings.dpi || settings.dots ? settings.dpi : std::optional<double>(kDefaultDpi);
   const nlohmann::ordered_json json{
       {"dpi", or_null(dpi)},
@@ -162,6 +163,12 @@ std::string job_settings_to_json(const JobSettings& settings) {
       {"cell", settings.cell},
       {"dry_run", settings.dry_run}};
   return json.dump();
+}
+
+std::string job_settings_sha256(JobSettings settings) {
+  settings.cell = "-";
+  settings.dry_run = false;
+  return sha256_hex(job_settings_to_json(settings));
 }
 
 const char* sampler_name(Sampler sampler) {

@@ -9,22 +9,22 @@
 #include "sampling/options/sample_options.h"
 #include "sampling/options/tone_options.h"
 
-/// What an operator may set for one job: the keys of a job file, of job.submit's "settings", and the flags of the
-/// command (size_mm: --size-mm).
+/// The settings of one job: the keys of a job file, of "settings" in job.submit, and the flags of the command (size_mm:
+/// --size-mm).
 namespace hilbrush {
 
 /// From wanted tone to asked coverage.
 enum class ToneMapping {
   kCalibrated,  ///< by the cell's tone curve
-  kLinear       ///< asked = wanted times the cell's asked_max: for a wedge that a curve is to be made from
+  kLinear       ///< asked = wanted times the cell's asked_max: for a gray wedge that a curve is made from
 };
 
-/// The post and plate that hold this job's object; what is unset is the cell's.
+/// The post and plate that hold this job's object; unset values are those of the cell.
 struct FixtureSettings {
   std::optional<double> post_height_mm, post_radius_mm, plate_radius_mm;
 };
 
-/// Where the object sits: turned about the post's axis, then shifted from the middle of the post's top.
+/// Where the object stands: turned about the axis of the post, then shifted from the center of the post's top.
 struct MountingSettings {
   std::array<double, 3> offset_mm{};
   double turn_deg = 0;
@@ -32,7 +32,7 @@ struct MountingSettings {
 
 struct JobSettings {
   std::optional<double> dpi;          ///< dots per 25.4 mm of full tone; or
-  std::optional<std::uint64_t> dots;  ///< exactly so many
+  std::optional<std::uint64_t> dots;  ///< exactly this many
   std::optional<double> size_mm;      ///< scale the longest side to this; or
   std::optional<double> units_mm;     ///< millimeters of one unit of the file
   std::optional<std::string> up;      ///< "y" or "z"
@@ -42,9 +42,9 @@ struct JobSettings {
   DensitySource density = DensitySource::kTexture;
   std::uint64_t seed = 1;
   int levels = 1;                             ///< energies that a dot may have, 1 to 4
-  int predictive_rounds = 0;                  ///< of the loop that predicts the picture and asks again, 0 to 4
+  int predictive_rounds = 0;                  ///< of the loop that predicts the picture and corrects the tone, 0 to 4
   std::optional<double> largest_gap_pitches;  ///< holes wider than this are filled with dots
-  int fine_passes = 24;                       ///< over all dots, of the sampler "fine"
+  int fine_passes = 24;                       ///< of the sampler "fine", each over all dots
   ToneMapping tone_curve = ToneMapping::kCalibrated;
   double max_incidence_deg = 45;
   double preferred_incidence_deg = 20;
@@ -58,11 +58,14 @@ struct JobSettings {
 };
 
 /// Strict: unknown keys, wrong types and values out of range are InputErrors with the JSON path; `origin` names the
-/// file in them, if any. `text` is a JSON object; every key may be left out or null. dpi becomes 100 if neither dpi nor
+/// file, if there is one. `text` is a JSON object; every key may be missing or null. dpi becomes 100 if neither dpi nor
 /// dots is given.
 JobSettings job_settings_from_json(const std::string& text, const std::string& origin = {});
 /// Canonical: all keys in a fixed order (null where nothing is set), so that its hash identifies the settings.
 std::string job_settings_to_json(const JobSettings& settings);
+/// Names the settings that shape a program. The cell has a hash of its own, and a dry run changes nothing about a
+/// program, so neither is part of it. Jobs and programs both carry it: the daemon paints a job only if they agree.
+std::string job_settings_sha256(JobSettings settings);
 
 /// The names of the choices in files, messages and reports.
 const char* sampler_name(Sampler sampler);           ///< "centroid", "jittered", ...

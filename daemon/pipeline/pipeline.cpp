@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <numbers>
@@ -72,22 +71,9 @@ class Stages {
 
 std::string hash_of_files(const std::vector<std::filesystem::path>& files) {
   Sha256 hash;
-  std::vector<std::uint8_t> block(1 << 16);
-  for (const auto& file : files) {
-    std::ifstream in(file, std::ios::binary);
-    while (in.read(reinterpret_cast<char*>(block.data()), static_cast<std::streamsize>(block.size())) ||
-           in.gcount() > 0)
-      hash.update(std::span(block.data(), static_cast<std::size_t>(in.gcount())));
-  }
+  for (const auto& file : files)
+    if (!hash.update_from_file(file)) throw InputError(file.string(), "cannot be read");
   return hash.hex_digest();
-}
-
-/// The settings that shape a program. Where it runs (cell) has a hash of its own, and whether it is a dry run changes
-/// nothing.
-std::string hash_of_settings(JobSettings settings) {
-  settings.cell = "-";
-  settings.dry_run = false;
-  return sha256_hex(job_settings_to_json(settings));
 }
 
 PlacementOptions placement_options(const JobSettings& settings) {
@@ -110,7 +96,7 @@ struct Workpiece {
     report.settings_json = job_settings_to_json(settings);
     report.seed = settings.seed;
     up = placement_options(settings).up.value_or(model.up);
-    provenance = {hash_of_files(model.files), hash_of_settings(settings), cell.sha256, HILBRUSH_VERSION};
+    provenance = {hash_of_files(model.files), job_settings_sha256(settings), cell.sha256, HILBRUSH_VERSION};
 
     auto repaired = stages.run("disk", [&](const Progress&) {
       return repair_mesh(mounted(place_on_table(model, placement_options(settings)), mounting_options(settings)));
@@ -289,12 +275,9 @@ std::string save_report(Workpiece& piece, const Stages& stages, const std::files
 
 ExposureProgram read_own_program(const Workpiece& piece, const std::filesystem::path& file) {
   ExposureProgram program = read_program(file);
-  const auto refuse = [&](const char* what) {
-    throw InputError(file.string(), std::string("was made for ") + what + "; it is not run or developed with this one");
-  };
-  if (program.provenance.model_sha256 != piece.provenance.model_sha256) refuse("another model");
-  if (program.provenance.settings_sha256 != piece.provenance.settings_sha256) refuse("other settings");
-  if (program.provenance.cell_sha256 != piece.provenance.cell_sha256) refuse("another cell");
+  const std::string mismatch = provenance_mismatch(program.provenance, piece.provenance);
+  if (!mismatch.empty())
+    throw InputError(file.string(), "was made for " + mismatch + "; it is not run or developed with this one");
   return program;
 }
 

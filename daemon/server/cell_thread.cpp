@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 
 #include "drivers/driver_error.h"
@@ -29,13 +28,9 @@ struct JobFilesFault : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-std::string file_sha256(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw JobFilesFault(file.string() + ": can't be read");
+std::string program_sha256(const std::filesystem::path& file) {
   Sha256 hash;
-  std::vector<char> block(std::size_t{1} << 18);
-  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0)
-    hash.update(std::string_view(block.data(), static_cast<std::size_t>(in.gcount())));
+  if (!hash.update_from_file(file)) throw JobFilesFault(file.string() + ": cannot be read");
   return hash.hex_digest();
 }
 
@@ -50,16 +45,13 @@ void sync_file_system(const std::filesystem::path& folder) {
 }
 
 void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
-  const auto refuse = [](const char* what) {
-    throw JobFilesFault(std::string("the program was made for ") + what +
-                        "; a program is never run on another cell or model");
-  };
-  if (found.cell_sha256 != description.sha256) refuse("another cell file");
-  if (found.model_sha256 != order.model_sha256) refuse("another model");
-  if (found.settings_sha256 != order.settings_sha256) refuse("other settings");
-  if (found.version != HILBRUSH_VERSION)
+  const Provenance wanted{order.model_sha256, order.settings_sha256, description.sha256, HILBRUSH_VERSION};
+  const std::string mismatch = provenance_mismatch(found, wanted);
+  if (!mismatch.empty())
+    throw JobFilesFault("the program was made for " + mismatch + "; a program is never run on another cell or model");
+  if (found.version != wanted.version)
     throw JobFilesFault("the program was made by version " + found.version + " of hilbrush, and this is " +
-                        HILBRUSH_VERSION + ": submit the model again");
+                        wanted.version + ": submit the model again");
 }
 
 }  // namespace
@@ -278,7 +270,7 @@ CellThread::Loaded CellThread::load(const PaintOrder& order) const {
     throw JobFilesFault(error.what());
   }
   check_provenance(program.provenance, order, description_);
-  const std::string sha256 = file_sha256(program_file);
+  const std::string sha256 = program_sha256(program_file);
   // What is wrong with a journal may be mended; the job stays resumable.
   const bool is_new = !std::filesystem::exists(journal_file);
   if (is_new && !order.may_create_journal)

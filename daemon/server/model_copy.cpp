@@ -16,6 +16,7 @@
 #include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
 #include "sampling/base/sha256.h"
+#include "sampling/base/write_all.h"
 
 namespace hilbrush {
 namespace {
@@ -68,17 +69,6 @@ int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
   return fd;
 }
 
-void write_all(int fd, const char* bytes, std::size_t count, const fs::path& file) {
-  while (count > 0) {
-    const ssize_t written = ::write(fd, bytes, count);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0)
-      throw InputError(file.string(), std::string("the job's copy can't be written: ") + std::strerror(errno));
-    bytes += written;
-    count -= static_cast<std::size_t>(written);
-  }
-}
-
 /// Relative to `base`, by name only: links were already followed or not when the list was made.
 fs::path place_below(const fs::path& file, const fs::path& base) {
   fs::path relative = fs::absolute(file).lexically_normal().lexically_relative(base);
@@ -103,8 +93,10 @@ std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintma
     copied += static_cast<std::uintmax_t>(count);
     if (copied > bytes_left)
       throw InputError(source.string(), "makes the model larger than " + std::to_string(kModelBytesMax >> 20) + " MB");
-    hash.update(std::string_view(block.data(), static_cast<std::size_t>(count)));
-    write_all(out.get(), block.data(), static_cast<std::size_t>(count), source);
+    const std::string_view bytes(block.data(), static_cast<std::size_t>(count));
+    hash.update(bytes);
+    if (!write_all(out.get(), bytes))
+      throw InputError(source.string(), std::string("the job's copy cannot be written: ") + std::strerror(errno));
   }
 }
 

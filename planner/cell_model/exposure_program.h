@@ -34,6 +34,10 @@ struct Provenance {
   std::string model_sha256, settings_sha256, cell_sha256, version;
 };
 
+/// What a program `found` was made for instead of what is `wanted`: "another cell", "another model", "other settings";
+/// empty if these agree. The version is not compared: programs of other versions may be read, but are not painted.
+std::string provenance_mismatch(const Provenance& found, const Provenance& wanted);
+
 struct ExposureProgram {
   Provenance provenance;
   double pitch_m = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <fstream>
+#include <vector>
 
 namespace hilbrush {
 namespace {
@@ -46,6 +48,16 @@ void Sha256::update(std::span<const std::uint8_t> bytes) {
 
 void Sha256::update(std::string_view text) {
   update(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+bool Sha256::update_from_file(const std::filesystem::path& file) {
+  constexpr std::size_t kFileBlockBytes = std::size_t{1} << 18;
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return false;
+  std::vector<char> block(kFileBlockBytes);
+  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0)
+    update(std::string_view(block.data(), static_cast<std::size_t>(in.gcount())));
+  return true;
 }
 
 std::string Sha256::hex_digest() {

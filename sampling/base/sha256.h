@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,8 @@ class Sha256 {
   Sha256();
   void update(std::span<const std::uint8_t> bytes);
   void update(std::string_view text);
+  /// With the bytes of a file. @return false if it cannot be opened.
+  [[nodiscard]] bool update_from_file(const std::filesystem::path& file);
   /// Hex digest; the object must not be used afterwards.
   std::string hex_digest();
 

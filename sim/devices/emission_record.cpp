@@ -13,6 +13,8 @@
 #include <string_view>
 #include <utility>
 
+#include "sampling/base/write_all.h"
+
 namespace hilbrush {
 
 namespace {
@@ -94,15 +96,8 @@ bool decode(std::span<const std::uint8_t> record, Emission& emission) {
   fail(file, what + ": " + std::strerror(errno));
 }
 
-void write_all(int fd, const std::filesystem::path& file, const void* data, std::size_t size) {
-  const char* next = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t written = ::write(fd, next, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail_by_system(file, "cannot be written");
-    next += written;
-    size -= static_cast<std::size_t>(written);
-  }
+void write_record(int fd, const std::filesystem::path& file, std::string_view bytes) {
+  if (!write_all(fd, bytes)) fail_by_system(file, "cannot be written");
 }
 
 std::vector<std::uint8_t> read_all(int fd, const std::filesystem::path& file) {
@@ -161,7 +156,7 @@ EmissionRecordFile::EmissionRecordFile(const std::filesystem::path& file) : file
   if (whole_bytes_ < bytes.size() && ::ftruncate(open.fd, static_cast<off_t>(whole_bytes_)) != 0)
     fail_by_system(file, "cannot be cut to its whole records");
   if (whole_bytes_ == 0) {
-    write_all(open.fd, file, kHeader.data(), kHeader.size());
+    write_record(open.fd, file, kHeader);
     whole_bytes_ = kHeader.size();
   }
   fd_ = std::exchange(open.fd, -1);
@@ -174,7 +169,7 @@ EmissionRecordFile::~EmissionRecordFile() {
 void EmissionRecordFile::append(const Emission& emission) {
   const Record record = encode(emission);
   try {
-    write_all(fd_, file_, record.data(), record.size());
+    write_record(fd_, file_, {reinterpret_cast<const char*>(record.data()), record.size()});
   } catch (...) {
     // Half a record (disk full) must not shift the ones that may follow.
     if (::ftruncate(fd_, static_cast<off_t>(whole_bytes_)) != 0) ::close(std::exchange(fd_, -1));
