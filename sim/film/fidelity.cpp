@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "sampling/base/batches.h"
 #include "sampling/base/random.h"
 #include "sim/film/masked_image.h"
 #include "sim/film/orthographic_view.h"
@@ -227,8 +228,7 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
                           const Progress& progress) {
   std::vector<Reading> readings = stratified_points(film.mesh(), seed);
   constexpr std::size_t kBatch = 2000;
-  for (std::size_t begin = 0; begin < readings.size(); begin += kBatch) {
-    const std::size_t end = std::min(begin + kBatch, readings.size());
+  for_batches(readings.size(), kBatch, progress.part(0, .5), [&](std::size_t begin, std::size_t end) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16),
                       [&](const tbb::blocked_range<std::size_t>& range) {
                         std::vector<FilmPoint> points;
@@ -237,8 +237,7 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
                           readings[i].is_reachable = !is_reachable || is_reachable(readings[i].point);
                         }
                       });
-    progress.part(0, .5).step(end, readings.size());
-  }
+  });
 
   Fidelity fidelity;
   fidelity.whole = surface_figures(readings, [](const Reading&) { return true; });

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sampling/base/batches.h"
 #include "sampling/base/check.h"
 #include "sim/film/beam.h"
 #include "sim/film/surface_index.h"
@@ -134,14 +135,12 @@ Film::Film(Film&&) noexcept = default;
 std::vector<Hit> Film::expose(std::span<const Emission> emissions, const Progress& progress) {
   std::vector<Hit> hits(emissions.size());
   std::vector<Spot> spots;
-  for (std::size_t begin = 0; begin < emissions.size(); begin += kBatch) {
-    const std::size_t count = std::min(kBatch, emissions.size() - begin);
-    spots.resize(count);
-    tbb::parallel_for(std::size_t{0}, count,
-                      [&](std::size_t i) { hits[begin + i] = implementation_->land(emissions[begin + i], spots[i]); });
+  for_batches(emissions.size(), kBatch, progress, [&](std::size_t begin, std::size_t end) {
+    spots.resize(end - begin);
+    tbb::parallel_for(begin, end,
+                      [&](std::size_t i) { hits[i] = implementation_->land(emissions[i], spots[i - begin]); });
     implementation_->expose(spots);
-    progress.step(begin + count, emissions.size());
-  }
+  });
   return hits;
 }
 
