@@ -63,7 +63,8 @@ void read_column(JsonObject& json, CellDescription::Arm& arm) {
 /// forearm.
 void read_links(JsonObject& json, const AxisDescription& j3, const CellDescription::Lens& lens,
                 CellDescription::Arm& arm) {
-  constexpr double kRadiusM = .035, kGapM = .03;
+  constexpr double kRadiusM = .035;
+  constexpr double kGapM = .03;
   const auto or_else = [&json](const char* key, JsonRange range, double otherwise) {
     return json.has(key) ? json.quantity(key, range) : otherwise;
   };

@@ -7,7 +7,8 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kRulesMax = 1000, kFileBytesMax = std::size_t{1} << 20;
+constexpr std::size_t kRulesMax = 1000;
+constexpr std::size_t kFileBytesMax = std::size_t{1} << 20;
 
 DaemonSettings::AccessRule read_rule(JsonObject& json) {
   DaemonSettings::AccessRule rule;
@@ -31,7 +32,7 @@ DaemonSettings::Tcp read_tcp(JsonObject& json) {
   if (const auto host = json.optional_text("host")) tcp.host = *host;
   tcp.port = static_cast<std::uint16_t>(json.integer("port", 0, 65535));
   json.objects("tokens", kRulesMax, [&](JsonObject& token) { tcp.tokens.push_back(read_token(token)); });
-  if (tcp.tokens.empty()) json.refuse("tokens", "without a token nobody could use it");
+  if (tcp.tokens.empty()) json.refuse("tokens", "is empty: without a token no client could connect over TCP");
   return tcp;
 }
 

@@ -5,23 +5,23 @@
 #include <string>
 #include <vector>
 
-/// The daemon's settings file: who may connect, and whether over TCP, too.
+/// The daemon's settings file: which users may connect, and whether TCP is served besides the Unix socket.
 ///
 ///   {"access": [{"user": "anna", "may": "operate"}, {"group": "staff", "may": "look"}],
 ///    "tcp": {"host": "127.0.0.1", "port": 4777, "tokens": [{"user": "anna", "sha256": "<64 hexadecimal digits>"}]}}
 ///
-/// Without `access` everybody who can open the Unix socket may operate. With it only those named may, of those who can;
-/// root and the daemon's own user always may. Who may look may also stop the cell. Without `tcp` there is no TCP.
+/// Without `access` every user that can open the Unix socket may operate. With it only the users and groups that it
+/// names; root and the daemon's own user always may. "look" includes stopping the cell. Without `tcp` there is no TCP.
 namespace hilbrush {
 
 struct DaemonSettings {
   struct AccessRule {
-    std::string user, group;   ///< one of them
-    bool may_operate = false;  ///< else: look
+    std::string user, group;   ///< exactly one of them is set
+    bool may_operate = false;  ///< false: may only look
   };
   struct Token {
-    std::string user;    ///< whoever brings the token acts with this local user's rights
-    std::string sha256;  ///< of the token's text, so that this file gives no token away
+    std::string user;    ///< a client with the token has the rights of this local user
+    std::string sha256;  ///< of the token's text, so that the file does not reveal the token
   };
   struct Tcp {
     std::string host = "127.0.0.1";  ///< an address of this machine

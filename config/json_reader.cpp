@@ -40,10 +40,10 @@ constexpr std::array<Unit, 10> kUnits{{{"_deg_s2", kDegree},
 double unit_of(const std::string& key) {
   for (const Unit& unit : kUnits)
     if (key.ends_with(unit.suffix)) return unit.si;
-  throw std::logic_error("key without a unit: " + key);  // a mistake of the reading code, not of the file
+  throw std::logic_error("key without a unit: " + key);  // an error of the reading code, not of the file
 }
 
-/// Degrees and thousandths are divided or multiplied so that 0.1 mm and 1e-4 m are the same double.
+/// Thousandths are divided by 1000 rather than multiplied by .001, so that 0.1 mm and 1e-4 m are the same double.
 double to_si(double value, double unit) {
   return unit == 1e-3 ? value / 1e3 : value * unit;
 }
@@ -76,7 +76,7 @@ std::string describe(JsonRange range) {
   return "a number from " + format_number(range.min) + " to " + format_number(range.max);
 }
 
-/// Keys with odd characters are quoted, so that a path stays readable and on one line.
+/// Keys with other characters than letters, digits, _ and - are quoted, so that a path stays readable and on one line.
 std::string path_step(const std::string& key) {
   const bool is_plain = !key.empty() && key.size() <= 60 && std::all_of(key.begin(), key.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-';
@@ -84,10 +84,11 @@ std::string path_step(const std::string& key) {
   return is_plain ? "." + key : "[" + describe(Json(key)) + "]";
 }
 
-/// Follows the parser through the document to refuse what the finished tree no longer shows.
-class StructureWatch {
+/// Follows the parser through the document and refuses what the finished tree no longer shows: duplicate keys and
+/// depth.
+class StructureCheck {
  public:
-  StructureWatch(const std::string& origin, const JsonLimits& limits) : origin_(origin), limits_(limits) {}
+  StructureCheck(const std::string& origin, const JsonLimits& limits) : origin_(origin), limits_(limits) {}
 
   bool operator()(int depth, Json::parse_event_t event, Json& parsed) {
     switch (event) {
@@ -129,14 +130,14 @@ class StructureWatch {
   std::vector<Level> levels_;
 };
 
-/// "file:line" for files, "$" and the column for lines of a protocol.
+/// Names "file:line" for files; "$", line and column for text without a file.
 [[noreturn]] void refuse_syntax(const std::string& text, const std::string& origin, std::size_t byte,
                                 std::string reason) {
   const std::size_t end = std::min(text.size(), byte > 0 ? byte - 1 : 0);
   const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
   const std::size_t line_start = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
   const std::size_t column = line_start == std::string::npos ? end + 1 : end - line_start;
-  // The library's sentence follows "...column N: "; what precedes it repeats the place.
+  // The library's sentence follows "...column N: "; the text before it repeats the position.
   if (const std::size_t start = reason.find(": "); start != std::string::npos) reason = reason.substr(start + 2);
   if (origin.empty())
     throw InputError("$",
@@ -148,7 +149,7 @@ Json parse_strictly(const std::string& text, const std::string& origin, const Js
   if (text.size() > limits.bytes)
     throw InputError(join(origin, "$"), "longer than " + std::to_string(limits.bytes) + " bytes");
   try {
-    return Json::parse(text, StructureWatch(origin, limits));
+    return Json::parse(text, StructureCheck(origin, limits));
   } catch (const Json::parse_error& error) {
     refuse_syntax(text, origin, error.byte, error.what());
   } catch (const Json::exception& error) {  // a number that no double can hold
@@ -172,7 +173,7 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-/// max_deg, max_rad and max are the same thing in other units.
+/// The key without its unit: max_deg, max_rad and max are the same quantity.
 std::string stem(const std::string& key) {
   constexpr std::array<std::string_view, 21> kEndings{
       "_deg_s2", "_rad_s2", "_deg_s", "_rad_s", "_mm_s2", "_m_s2", "_mm_s", "_m_s", "_j_m2", "_deg", "_rad",
@@ -188,7 +189,8 @@ std::optional<std::string> nearest_word(const std::string& word, const std::vect
   constexpr std::size_t kMax = 64;
   if (word.size() > kMax) return std::nullopt;
   std::optional<std::string> nearest;
-  std::size_t least = 1 + std::min<std::size_t>(2, (word.size() + 1) / 3);  // fewer changes than this
+  // One change in a word of up to 3 letters, at most two in a longer one: more would be guessing.
+  std::size_t least = 1 + std::min<std::size_t>(2, (word.size() + 1) / 3);
   for (const std::string& candidate : words) {
     if (stem(candidate) == stem(word)) return candidate;
     if (const std::size_t distance = edit_distance(word, candidate); distance < least) {
@@ -229,11 +231,11 @@ bool JsonObject::has(const std::string& key) const {
 }
 
 const Json& JsonObject::value(const std::string& key, const char* expected) {
-  asked_.insert(key);
+  read_keys_.insert(key);
   if (const auto found = value_.find(key); found != value_.end()) return *found;
   std::vector<std::string> unread;
   for (const auto& item : value_.items())
-    if (!asked_.contains(item.key())) unread.push_back(item.key());
+    if (!read_keys_.contains(item.key())) unread.push_back(item.key());
   const std::optional<std::string> instead = nearest_word(key, unread);
   refuse(key, std::string("missing: expected ") + expected +
                   (instead ? ", found the key \"" + *instead + "\" instead" : ""));
@@ -260,7 +262,7 @@ std::uint64_t JsonObject::integer(const std::string& key, std::uint64_t min, std
   const Json& found = value(key, expected.c_str());
   if (found.is_number_unsigned() && found.get<std::uint64_t>() >= min && found.get<std::uint64_t>() <= max)
     return found.get<std::uint64_t>();
-  // 5e4 is a whole number too, where a double holds it exactly.
+  // 5e4 is a whole number too, as long as a double holds it exactly.
   if (found.is_number_float()) {
     constexpr double kExact = 9007199254740992;  // 2^53
     const double number = found.get<double>();
@@ -342,37 +344,37 @@ void JsonObject::objects(const std::string& key, std::size_t count_max, const Vi
 }
 
 std::optional<double> JsonObject::optional_number(const std::string& key, JsonRange range) {
-  asked_.insert(key);
+  read_keys_.insert(key);
   return has(key) ? std::optional(number(key, range)) : std::nullopt;
 }
 
 std::optional<std::uint64_t> JsonObject::optional_integer(const std::string& key, std::uint64_t min,
                                                           std::uint64_t max) {
-  asked_.insert(key);
+  read_keys_.insert(key);
   return has(key) ? std::optional(integer(key, min, max)) : std::nullopt;
 }
 
 std::optional<std::size_t> JsonObject::optional_choice(const std::string& key,
                                                        const std::vector<std::string>& choices) {
-  asked_.insert(key);
+  read_keys_.insert(key);
   return has(key) ? std::optional(choice(key, choices)) : std::nullopt;
 }
 
 std::optional<std::string> JsonObject::optional_text(const std::string& key, std::size_t length_max) {
-  asked_.insert(key);
+  read_keys_.insert(key);
   return has(key) ? std::optional(text(key, length_max)) : std::nullopt;
 }
 
 std::optional<bool> JsonObject::optional_boolean(const std::string& key) {
-  asked_.insert(key);
+  read_keys_.insert(key);
   return has(key) ? std::optional(boolean(key)) : std::nullopt;
 }
 
 void JsonObject::refuse_unread() const {
   for (const auto& item : value_.items()) {
-    if (asked_.contains(item.key())) continue;
-    std::vector<std::string> free_keys;  // a key that is already there is not what was meant
-    for (const std::string& key : asked_)
+    if (read_keys_.contains(item.key())) continue;
+    std::vector<std::string> free_keys;  // a key that is present cannot be the one that was meant
+    for (const std::string& key : read_keys_)
       if (!value_.contains(key)) free_keys.push_back(key);
     const std::optional<std::string> meant = nearest_word(item.key(), free_keys);
     refuse(item.key(), meant ? "unknown key; did you mean \"" + *meant + "\"?" : "unknown key");

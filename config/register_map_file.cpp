@@ -16,7 +16,7 @@ constexpr std::size_t kMapBytesMax = 256u << 10;
 constexpr std::size_t kRegistersMax = 100;
 constexpr std::size_t kStepsMax = 50;
 
-/// Addresses, masks and codes are as readable as in the drive's manual: a whole number, or "0x6040".
+/// Addresses, masks and codes as the drive's manual writes them: a whole number, or "0x6040".
 std::uint32_t code(JsonObject& json, const std::string& key, std::uint32_t max = 0xFFFFFFFF) {
   if (!json.is_text(key)) return static_cast<std::uint32_t>(json.integer(key, 0, max));
   const std::string text = json.text(key, 12);
@@ -25,7 +25,7 @@ std::uint32_t code(JsonObject& json, const std::string& key, std::uint32_t max =
   const bool is_hex = text.starts_with("0x");
   const auto [rest, error] = std::from_chars(text.data() + (is_hex ? 2 : 0), end, value, is_hex ? 16 : 10);
   if (error != std::errc() || rest != end || text.size() < 3 || value > max)
-    json.refuse(key, "\"" + text + "\" is no number of the form 0x6040, or too large");
+    json.refuse(key, "\"" + text + "\" is not a number of the form 0x6040, or too large");
   return value;
 }
 
@@ -63,11 +63,11 @@ class MapReader {
     const auto takes_target = [](const RegisterStep& step) { return step.source == RegisterStep::Source::kTarget; };
     if (std::none_of(map_.move.begin(), map_.move.end(), takes_target) &&
         std::none_of(map_.prepare.begin(), map_.prepare.end(), takes_target))
-      json.refuse("move", "writes the target nowhere, nor does prepare");
+      json.refuse("move", "neither move nor prepare writes the target");
     check_prepare(json);
-    if (map_.stop.empty()) json.refuse("stop", "has no step: an axis that can't be stopped is not driven");
+    if (map_.stop.empty()) json.refuse("stop", "has no step: an axis that cannot be stopped is not driven");
     if (map_.arrived.empty() && !map_.setpoint)
-      json.refuse("arrived", "is empty, and there is no setpoint: a move's end could not be told");
+      json.refuse("arrived", "is empty, and there is no setpoint: the end of a move could not be detected");
     return std::move(map_);
   }
 
@@ -112,7 +112,8 @@ class MapReader {
     return steps;
   }
 
-  /// What is written while light is on must be inert: numbers in registers that no handshake works with.
+  /// `prepare` is written while the beam is on, so it must have no effect: only numbers in registers that no handshake
+  /// uses.
   void check_prepare(JsonObject& json) {
     for (const RegisterStep& step : map_.prepare) {
       if (step.kind != RegisterStep::Kind::kWrite || step.source == RegisterStep::Source::kConstant)
@@ -123,7 +124,7 @@ class MapReader {
           if (other.kind != RegisterStep::Kind::kPause &&
               share_words(map_.registers[other.reg], map_.registers[step.reg]))
             json.refuse("prepare", "writes " + map_.registers[step.reg].name +
-                                       ", which another list uses: what a handshake works with can't be written ahead");
+                                       ", which another list uses: registers of a handshake cannot be written ahead");
     }
   }
 

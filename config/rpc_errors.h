@@ -11,7 +11,7 @@ enum RpcError : int {
   kRpcBadParams = -32602,  ///< data.at: the JSON path
   kRpcInternal = -32000,   ///< a fault of the daemon
   kRpcNoSuchJob = -32001,
-  kRpcWrongState = -32002,  ///< the message says which state forbids what
+  kRpcWrongState = -32002,  ///< the message names the state that forbids the request
   kRpcBadInput = -32003,    ///< model, settings or cell; data.at: file:line or JSON path
   kRpcDeviceFault = -32004,
   kRpcNotPermitted = -32005

@@ -179,7 +179,8 @@ TEST(JsonReader, NearestWordIsShyOfGuessing) {
 TEST(JsonReader, MutatedBytesAreAcceptedOrRefusedAndNothingElse) {
   constexpr unsigned kSeed = 11;
   std::mt19937 random(kSeed);
-  int accepted = 0, refused = 0;
+  int accepted = 0;
+  int refused = 0;
   for (int round = 0; round < 20'000; ++round) {
     std::string text = kSample;
     for (unsigned change = 0; change <= random() % 4; ++change) {
