@@ -17,16 +17,13 @@ constexpr std::uint64_t kDotsMax = 1'000'000'000;  // what memory allows is foun
 constexpr std::uint64_t kLevelsMax = 4;
 constexpr std::size_t kSettingsBytesMax = 64u << 10;
 
-const std::vector<std::string> kSamplerNames{"centroid",   "jittered", "even",         "random", "halton",
-                                             "hammersley", "sobol",    "niederreiter", "blue",   "fine"};
-const std::vector<std::string> kUntexturedNames{"auto", "blank", "material"};
-const std::vector<std::string> kCurveNames{"hilbert", "peano2", "laminar"};
-const std::vector<std::string> kDensityNames{"texture", "mean_curvature", "gaussian_curvature"};
-const std::vector<std::string> kToneMappingNames{"calibrated", "linear"};
 const std::vector<std::string> kUpNames{"y", "z"};
-const std::vector<std::string> kPlanningNames{"quality", "balanced", "fast"};
-const std::vector<std::string> kOrderNames{"improved", "curve"};
-const std::vector<std::string> kPolicyNames{"search", "follow_normal"};
+
+/// The choice of an enum's value by its name, if there is one under `key`.
+template <class Enum, std::size_t kCount>
+void read_choice(JsonObject& json, const char* key, const EnumName<Enum> (&names)[kCount], Enum& value) {
+  if (const auto choice = json.optional_choice(key, all_names(names))) value = names[*choice].value;
+}
 
 /// How many dots, and how large the object: of each pair at most one.
 void read_amounts(JsonObject& json, JobSettings& settings) {
@@ -50,11 +47,9 @@ void read_incidence(JsonObject& json, JobSettings& settings) {
 }
 
 void read_planning(JsonObject& json, JobSettings& settings) {
-  if (const auto choice = json.optional_choice("planning", kPlanningNames))
-    settings.planning = static_cast<Planning>(*choice);
-  if (const auto choice = json.optional_choice("order", kOrderNames)) settings.order = static_cast<DotOrder>(*choice);
-  if (const auto choice = json.optional_choice("policy", kPolicyNames))
-    settings.policy = static_cast<PosePolicy>(*choice);
+  read_choice(json, "planning", kPlanningNames, settings.planning);
+  read_choice(json, "order", kOrderNames, settings.order);
+  read_choice(json, "policy", kPolicyNames, settings.policy);
 }
 
 /// How this job's object is held.
@@ -78,11 +73,9 @@ void read_mounting(JsonObject& json, JobSettings& settings) {
 
 /// How dots are placed, and what improves them afterwards.
 void read_sampling(JsonObject& json, JobSettings& settings) {
-  if (const auto choice = json.optional_choice("sampler", kSamplerNames))
-    settings.sampler = static_cast<Sampler>(*choice);
-  if (const auto choice = json.optional_choice("curve", kCurveNames)) settings.curve = static_cast<CurveKind>(*choice);
-  if (const auto choice = json.optional_choice("density", kDensityNames))
-    settings.density = static_cast<DensitySource>(*choice);
+  read_choice(json, "sampler", kSamplerNames, settings.sampler);
+  read_choice(json, "curve", kCurveNames, settings.curve);
+  read_choice(json, "density", kDensityNames, settings.density);
   settings.seed = json.optional_integer("seed", 0, UINT64_MAX).value_or(settings.seed);
   const auto small = [&json](const char* key, std::uint64_t min, std::uint64_t max, int otherwise) {
     const auto number = json.optional_integer(key, min, max);
@@ -92,8 +85,7 @@ void read_sampling(JsonObject& json, JobSettings& settings) {
   settings.predictive_rounds = small("predictive_rounds", 0, 4, settings.predictive_rounds);
   settings.largest_gap_pitches = json.optional_number("largest_gap_pitches", {.7, 100});
   settings.fine_passes = small("fine_passes", 1, 1000, settings.fine_passes);
-  if (const auto choice = json.optional_choice("tone_curve", kToneMappingNames))
-    settings.tone_curve = static_cast<ToneMapping>(*choice);
+  read_choice(json, "tone_curve", kToneMappingNames, settings.tone_curve);
   if (settings.largest_gap_pitches && settings.dots)
     json.refuse("largest_gap_pitches", "contradicts dots: filling holes adds to their number");
   if (settings.curve != CurveKind::kLaminar) return;
@@ -106,8 +98,7 @@ JobSettings read_settings(JsonObject& json) {
   JobSettings settings;
   read_amounts(json, settings);
   if (const auto up = json.optional_choice("up", kUpNames)) settings.up = kUpNames[*up];
-  if (const auto choice = json.optional_choice("untextured", kUntexturedNames))
-    settings.untextured = static_cast<Untextured>(*choice);
+  read_choice(json, "untextured", kUntexturedNames, settings.untextured);
   read_sampling(json, settings);
   read_incidence(json, settings);
   read_planning(json, settings);
@@ -169,38 +160,6 @@ std::string job_settings_sha256(JobSettings settings) {
   settings.cell = "-";
   settings.dry_run = false;
   return sha256_hex(job_settings_to_json(settings));
-}
-
-const char* sampler_name(Sampler sampler) {
-  return kSamplerNames[static_cast<std::size_t>(sampler)].c_str();
-}
-
-const char* curve_name(CurveKind curve) {
-  return kCurveNames[static_cast<std::size_t>(curve)].c_str();
-}
-
-const char* density_name(DensitySource density) {
-  return kDensityNames[static_cast<std::size_t>(density)].c_str();
-}
-
-const char* tone_mapping_name(ToneMapping mapping) {
-  return kToneMappingNames[static_cast<std::size_t>(mapping)].c_str();
-}
-
-const char* planning_name(Planning planning) {
-  return kPlanningNames[static_cast<std::size_t>(planning)].c_str();
-}
-
-const char* order_name(DotOrder order) {
-  return kOrderNames[static_cast<std::size_t>(order)].c_str();
-}
-
-const char* policy_name(PosePolicy policy) {
-  return kPolicyNames[static_cast<std::size_t>(policy)].c_str();
-}
-
-const char* untextured_name(Untextured untextured) {
-  return kUntexturedNames[static_cast<std::size_t>(untextured)].c_str();
 }
 
 SampleOptions sample_options(const JobSettings& settings) {

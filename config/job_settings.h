@@ -6,6 +6,7 @@
 
 #include "planner/cell_model/mounting_options.h"
 #include "planner/cell_model/plan_options.h"
+#include "sampling/base/enum_names.h"
 #include "sampling/options/sample_options.h"
 #include "sampling/options/tone_options.h"
 
@@ -18,6 +19,15 @@ enum class ToneMapping {
   kCalibrated,  ///< by the cell's tone curve
   kLinear       ///< asked = wanted times the cell's asked_max: for a gray wedge that a curve is made from
 };
+
+inline constexpr EnumName<ToneMapping> kToneMappingNames[] = {
+    {ToneMapping::kCalibrated, "calibrated"},
+    {ToneMapping::kLinear, "linear"},
+};
+
+inline const char* tone_mapping_name(ToneMapping mapping) {
+  return name_of(kToneMappingNames, mapping);
+}
 
 /// The post and plate that hold this job's object; unset values are those of the cell.
 struct FixtureSettings {
@@ -66,16 +76,6 @@ std::string job_settings_to_json(const JobSettings& settings);
 /// Names the settings that shape a program. The cell has a hash of its own, and a dry run changes nothing about a
 /// program, so neither is part of it. Jobs and programs both carry it: the daemon paints a job only if they agree.
 std::string job_settings_sha256(JobSettings settings);
-
-/// The names of the choices in files, messages and reports.
-const char* sampler_name(Sampler sampler);           ///< "centroid", "jittered", ...
-const char* curve_name(CurveKind curve);             ///< "hilbert", "peano2", "laminar"
-const char* density_name(DensitySource density);     ///< "texture", "mean_curvature", "gaussian_curvature"
-const char* untextured_name(Untextured untextured);  ///< "auto", "blank", "material"
-const char* tone_mapping_name(ToneMapping mapping);  ///< "calibrated", "linear"
-const char* planning_name(Planning planning);        ///< "quality", "balanced", "fast"
-const char* order_name(DotOrder order);              ///< "improved", "curve"
-const char* policy_name(PosePolicy policy);          ///< "search", "follow_normal"
 
 SampleOptions sample_options(const JobSettings& settings);
 PlanOptions plan_options(const JobSettings& settings);

@@ -2,7 +2,10 @@
 #include <string>
 #include <vector>
 
-/// Options of the tone: what the paint can show and what must be asked of it. Std only, so that config/ can read them.
+#include "sampling/base/enum_names.h"
+
+/// Options of the tone: what the paint can show and what must be asked of it. No mesh and no picture, so that config/
+/// can read them.
 namespace hilbrush {
 
 /// Asked coverage for wanted coverage, both 0 = white, 1 = one full dot a pitch squared; undoes dot gain. Piecewise
@@ -20,6 +23,16 @@ enum class Untextured {
   kBlank,    ///< never painted
   kMaterial  ///< its material is painted
 };
+
+inline constexpr EnumName<Untextured> kUntexturedNames[] = {
+    {Untextured::kAuto, "auto"},
+    {Untextured::kBlank, "blank"},
+    {Untextured::kMaterial, "material"},
+};
+
+inline const char* untextured_name(Untextured untextured) {
+  return name_of(kUntexturedNames, untextured);
+}
 
 struct ToneOptions {
   double reflectance_white = 1;  ///< linear-light reflectance of unexposed paint ...
