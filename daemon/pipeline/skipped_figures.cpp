@@ -1,28 +1,22 @@
 #include "daemon/pipeline/skipped_figures.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <map>
-#include <numbers>
 #include <utility>
+
+#include "sampling/base/angles.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, value < 10 ? "%.2g" : "%.0f", value);
-  return text;
-}
-
-/// How the amount is told after what it is an amount of.
-std::string amounts_text(const SkippedFigures& figures, bool is_beam) {
+/// The end of the sentence: by how much.
+std::string amounts_text(const SkippedFigures& figures, SkipMeasure measure) {
   const std::string unit = figures.unit == "deg" ? "degrees" : figures.unit;
-  if (figures.unit.empty()) return {};
-  if (is_beam)
-    return ", typically " + number(figures.typical) + " " + unit + " from the dot, nearest " + number(figures.worst) +
+  if (measure == SkipMeasure::kFreeLength)
+    return ", typically " + amount(figures.typical) + " " + unit + " from the dot, nearest " + amount(figures.worst) +
            " " + unit;
-  return ", typically by " + number(figures.typical) + ", at most by " + number(figures.worst) + " " + unit;
+  return ", typically by " + amount(figures.typical) + ", at most by " + amount(figures.worst) + " " + unit;
 }
 
 }  // namespace
@@ -38,15 +32,16 @@ std::vector<SkippedFigures> skipped_figures(const std::vector<SkippedDot>& skipp
     figures.what = key.second.empty() ? dots.front()->detail : std::string(key.second);
     figures.count = dots.size();
     if (!key.second.empty()) {
-      // A beam that is blocked near the dot is farther from being free than one that is blocked at the lens.
-      const bool is_beam = key.second.starts_with("beam ");
+      const SkipMeasure measure = dots.front()->measure;
+      const bool is_angle = measure == SkipMeasure::kExcessAngle;
       std::sort(dots.begin(), dots.end(),
                 [](const SkippedDot* a, const SkippedDot* b) { return a->amount < b->amount; });
-      const double scale = dots.front()->is_angle ? 180 / std::numbers::pi : 1e3;
-      figures.unit = dots.front()->is_angle ? "deg" : "mm";
+      const double scale = is_angle ? 1 / kDegree : 1e3;
+      figures.unit = is_angle ? "deg" : "mm";
       figures.typical = scale * dots[dots.size() / 2]->amount;
-      figures.worst = scale * (is_beam ? dots.front() : dots.back())->amount;
-      figures.text = figures.what + amounts_text(figures, is_beam);
+      // The nearer to the dot a beam is blocked, the farther it is from being free.
+      figures.worst = scale * (measure == SkipMeasure::kFreeLength ? dots.front() : dots.back())->amount;
+      figures.text = figures.what + amounts_text(figures, measure);
     } else {
       figures.text = figures.what;
     }

@@ -48,7 +48,7 @@ std::size_t count_of(const Picture& picture, const std::array<std::uint8_t, 3>& 
 
 TEST(PlanningPictures, SkippedDotsHaveTheColorOfTheirReason) {
   constexpr std::size_t kSkipped = 100;
-  for (const SkipReason reason : {SkipReason::kOccluded, SkipReason::kJointLimit, SkipReason::kNoWay}) {
+  for (const SkipReason reason : {SkipReason::kOccluded, SkipReason::kJointLimit, SkipReason::kNoPath}) {
     const PlannedPlate some(kSkipped, reason), none(0, reason);
     const Picture marked = planning_sheet(some.mesh, some.dots, some.plan);
     // A quarter of a plate that is 400 pixels wide, marks touching; seen from the top only, and as a line on its edge.
