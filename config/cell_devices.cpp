@@ -22,7 +22,7 @@ struct DeviceContext {
   const fs::path& folder;
 };
 
-bool is_prismatic(int axis) {
+bool is_prismatic(std::size_t axis) {
   return axis == kJ3;
 }
 
@@ -31,7 +31,7 @@ AxisBounds bounds_of(const AxisDescription& axis) {
 }
 
 /// Reads sign and offset; also steps_per_unit if `has_steps`, else the device counts in degrees or millimeters.
-AxisScale read_scale(JsonObject& json, int axis, bool has_steps) {
+AxisScale read_scale(JsonObject& json, std::size_t axis, bool has_steps) {
   const char* unit = is_prismatic(axis) ? "mm" : "deg";
   const double unit_si = is_prismatic(axis) ? 1e-3 : kDegree;
   AxisScale scale;
@@ -46,7 +46,7 @@ AxisScale read_scale(JsonObject& json, int axis, bool has_steps) {
   return scale;
 }
 
-double read_window(JsonObject& json, int axis) {
+double read_window(JsonObject& json, std::size_t axis) {
   const std::string key = is_prismatic(axis) ? "window_mm" : "window_deg";
   if (json.has(key)) return json.quantity(key, {0, 1});
   return is_prismatic(axis) ? 5e-6 : 0.003 * kDegree;
@@ -65,13 +65,13 @@ DobotOptions read_dobot(JsonObject& json, const DeviceContext& context) {
   options.speed_percent = static_cast<int>(json.optional_integer("speed_percent", 1, 100).value_or(100));
   options.window_rad = read_window(json, kJ1);
   options.window_m = read_window(json, kJ3);
-  for (int i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < 4; ++i) {
     options.bounds[i] = bounds_of(context.cell.axes[i]);
     options.scales[i].steps_per_unit = is_prismatic(i) ? 1e3 : 1 / kDegree;
   }
   if (json.has("axes"))
     json.object("axes", [&](JsonObject& axes) {
-      for (int i = 0; i < 4; ++i)
+      for (std::size_t i = 0; i < 4; ++i)
         if (axes.has(kAxisNames[i]))
           axes.object(kAxisNames[i], [&](JsonObject& axis) { options.scales[i] = read_scale(axis, i, false); });
     });
@@ -97,7 +97,8 @@ ModbusEndpoint read_endpoint(JsonObject& json) {
 
 /// `first`: index of the group's first axis among the cell's six axes.
 template <std::size_t N>
-ModbusGroupOptions<N> read_modbus_group(JsonObject& json, int first, bool is_mapped, const DeviceContext& context) {
+ModbusGroupOptions<N> read_modbus_group(JsonObject& json, std::size_t first, bool is_mapped,
+                                        const DeviceContext& context) {
   ModbusGroupOptions<N> options;
   if (is_mapped) {
     const std::string map = json.text("map");
@@ -114,7 +115,7 @@ ModbusGroupOptions<N> read_modbus_group(JsonObject& json, int first, bool is_map
   if (is_shared) shared = read_endpoint(json);
   json.object("axes", [&](JsonObject& axes) {
     for (std::size_t i = 0; i < N; ++i) {
-      const int index = first + static_cast<int>(i);
+      const std::size_t index = first + i;
       axes.object(kAxisNames[index], [&](JsonObject& axis) {
         ModbusAxisOptions& entry = options.axes[i];
         const bool has_own = axis.has("host") || axis.has("port");
@@ -126,7 +127,7 @@ ModbusGroupOptions<N> read_modbus_group(JsonObject& json, int first, bool is_map
         entry.homes_to_zero = axis.optional_choice("home", {"absolute", "reference_run"}).value_or(0) == 1;
         for (std::size_t other = 0; other < i; ++other)
           if (options.axes[other].endpoint == entry.endpoint && options.axes[other].unit == entry.unit)
-            axis.refuse("unit", "axis " + std::string(kAxisNames[first + static_cast<int>(other)]) + " has it already");
+            axis.refuse("unit", "axis " + std::string(kAxisNames[first + other]) + " has it already");
       });
     }
   });

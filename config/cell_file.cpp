@@ -21,7 +21,7 @@ constexpr std::size_t kCellBytesMax = 1u << 20;
 constexpr std::size_t kToneCurvesMax = 256;
 constexpr std::size_t kTonePointsMax = 1001;
 
-AxisDescription read_axis(JsonObject& json, AxisIndex axis) {
+AxisDescription read_axis(JsonObject& json, std::size_t axis) {
   const bool is_linear = axis == kJ3;
   const std::string unit = is_linear ? "_mm" : "_deg";
   // The rotary table may turn many times, a joint of the arm about once.
@@ -175,8 +175,8 @@ CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOp
   CellDescription cell;
   cell.name = json.text("name", 100);
   json.object("axes", [&](JsonObject& axes) {
-    for (int i = 0; i < kAxisCount; ++i)
-      axes.object(kAxisNames[i], [&](JsonObject& axis) { cell.axes[i] = read_axis(axis, static_cast<AxisIndex>(i)); });
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      axes.object(kAxisNames[i], [&](JsonObject& axis) { cell.axes[i] = read_axis(axis, i); });
   });
   cell.limit_margin = json.number("limit_margin", {0, 0.4});
   json.object("lens", [&](JsonObject& lens) { read_lens(lens, cell.lens); });

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "config/cell_devices.h"
 #include "config/cell_file.h"
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
@@ -30,23 +31,22 @@ struct Finding {
 };
 
 /// A position in millimeters or degrees.
-std::string position_text(int axis, double value) {
+std::string position_text(std::size_t axis, double value) {
   return axis == kJ3 ? fmt::format("{:.3f} mm", value * 1e3) : fmt::format("{:.4f} degrees", value / kDegree);
 }
 
 /// `first`: index of the group's first axis among the cell's six axes.
 template <std::size_t N>
-void check_axes(AxisGroup<N>& axes, int first, const CellDescription& cell,
+void check_axes(AxisGroup<N>& axes, std::size_t first, const CellDescription& cell,
                 const std::function<std::vector<std::string>()>& identify, Finding& finding) {
   axes.connect();
   finding.found = identify();
   const auto status = axes.status();
   if (status.state == DeviceState::kFault) finding.problems.push_back(status.fault);
   for (std::size_t i = 0; i < N; ++i) {
-    const int axis = first + static_cast<int>(i);
-    const AxisDescription& limits = cell.axes[static_cast<std::size_t>(axis)];
-    const std::string at =
-        std::string(kAxisNames[static_cast<std::size_t>(axis)]) + " is at " + position_text(axis, status.positions[i]);
+    const std::size_t axis = first + i;
+    const AxisDescription& limits = cell.axes[axis];
+    const std::string at = std::string(kAxisNames[axis]) + " is at " + position_text(axis, status.positions[i]);
     finding.found.push_back(at);
     if (!(status.positions[i] >= limits.min && status.positions[i] <= limits.max))
       finding.problems.push_back(at + ", outside the cell file's limits " + position_text(axis, limits.min) + " to " +
@@ -141,11 +141,13 @@ struct JogFlags {
 };
 
 // Small enough to stop by hand what goes the wrong way, large enough to see which way it goes.
-constexpr double kMaxStepDeg = 15, kMaxStepMm = 20;
+constexpr double kMaxStepDeg = 15;
+constexpr double kMaxStepMm = 20;
 constexpr double kJogSpeedShare = 0.05;  ///< of the speeds and accelerations in the cell file
 constexpr int kJogSpeedPercent = 5;      ///< the same for a Dobot, which takes whole percent
 constexpr double kSettleS = 0.2;
-constexpr double kMoveTimeoutS = 60, kPollS = 0.02;
+constexpr double kMoveTimeoutS = 60;
+constexpr double kPollS = 0.02;
 
 /// The same devices, slow. An axis that homes by a reference run does not home.
 CellDeviceOptions slowed(CellDeviceOptions options) {
@@ -162,12 +164,12 @@ CellDeviceOptions slowed(CellDeviceOptions options) {
   return options;
 }
 
-int axis_index(const std::string& name) {
+std::size_t axis_index(const std::string& name) {
   const auto found = std::find(kAxisNames.begin(), kAxisNames.end(), name);
-  return static_cast<int>(found - kAxisNames.begin());
+  return static_cast<std::size_t>(found - kAxisNames.begin());
 }
 
-double step_of(const JogFlags& flags, int axis) {
+double step_of(const JogFlags& flags, std::size_t axis) {
   const bool is_linear = axis == kJ3;
   if (is_linear != flags.by_mm.has_value() || is_linear == flags.by_deg.has_value())
     throw InputError(
@@ -216,7 +218,7 @@ double finish_move(AxisGroup<N>& axes, std::size_t index, Clock& clock, Interrup
 template <std::size_t N>
 int jog_axes(const CommandContext& context, const JogFlags& flags, AxisGroup<N>& axes, std::size_t index, double step,
              Clock& clock, InterruptWatch& interrupt) {
-  const int axis = axis_index(flags.axis);
+  const std::size_t axis = axis_index(flags.axis);
   axes.connect();
   auto target = axes.status().positions;
   const double from = target[index];
@@ -241,7 +243,7 @@ int jog_axes(const CommandContext& context, const JogFlags& flags, AxisGroup<N>&
 }
 
 int jog(const CommandContext& context, const JogFlags& flags) {
-  const int axis = axis_index(flags.axis);
+  const std::size_t axis = axis_index(flags.axis);
   const double step = step_of(flags, axis);
   InterruptWatch interrupt;  // before the devices' threads
   const std::filesystem::path file = find_cell(flags.cell);
@@ -250,10 +252,8 @@ int jog(const CommandContext& context, const JogFlags& flags) {
   const Cell cell = devices->cell();
   cell.laser.connect();  // turns the emission off and closes the gate, or fails
   cell.laser.disable();
-  return axis < kTilt
-             ? jog_axes<4>(context, flags, cell.robot, static_cast<std::size_t>(axis), step, cell.clock, interrupt)
-             : jog_axes<2>(context, flags, cell.table, static_cast<std::size_t>(axis - kTilt), step, cell.clock,
-                           interrupt);
+  return axis < kTilt ? jog_axes<4>(context, flags, cell.robot, axis, step, cell.clock, interrupt)
+                      : jog_axes<2>(context, flags, cell.table, axis - kTilt, step, cell.clock, interrupt);
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ TEST(CellFile, TheDefaultCellHasTheLimitsThatPlanningWasMeasuredWith) {
 TEST(CellFile, HomeOfEveryShippedCellIsWithinWhatPlanningMayUse) {
   for (const fs::directory_entry& entry : fs::directory_iterator(shipped("default").parent_path())) {
     const CellDescription cell = load_cell(entry.path());
-    for (int i = 0; i < kAxisCount; ++i) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
       const AxisDescription& axis = cell.axes[i];
       const double margin = cell.limit_margin * (axis.max - axis.min);
       EXPECT_GE(axis.home, axis.min + margin) << entry.path() << " " << kAxisNames[i];
