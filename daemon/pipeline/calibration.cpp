@@ -14,7 +14,8 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kDefaultDpi = 100;  // where the spot is given in pitches the curve does not depend on the pitch
+/// Of job settings. If the cell file gives the spot in pitches, the tone curve does not depend on it.
+constexpr double kDefaultDpi = 100;
 
 double pitch_of(const JobSettings& settings) {
   return 25.4e-3 / settings.dpi.value_or(kDefaultDpi);
@@ -62,7 +63,7 @@ std::string run_calibrate(const PipelineRequest& request, const std::filesystem:
   make_output_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   if (calibrated_sampler(request.settings.sampler) != request.settings.sampler)
-    throw InputError("sampler", std::string(sampler_name(request.settings.sampler)) + " paints by the tone curve of " +
+    throw InputError("sampler", std::string(sampler_name(request.settings.sampler)) + " uses the tone curve of " +
                                     sampler_name(calibrated_sampler(request.settings.sampler)) + ": calibrate that");
   if (listener.on_progress) listener.on_progress("paint", 0);
   const PictureOptions options = picture_options(cell, request.settings);

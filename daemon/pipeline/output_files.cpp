@@ -11,7 +11,7 @@ void make_output_folder(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder))
     throw InputError(folder.string(),
-                     "can't be made or is no folder" + (error ? ": " + error.message() : std::string()));
+                     "cannot be made or is not a folder" + (error ? ": " + error.message() : std::string()));
 }
 
 void write_text_file(const std::filesystem::path& file, const std::string& text) {
@@ -20,11 +20,11 @@ void write_text_file(const std::filesystem::path& file, const std::string& text)
     std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
     out << text;
     out.flush();
-    if (!out) throw InputError(file.string(), "can't be written (no such folder, no permission, or the disk is full)");
+    if (!out) throw InputError(file.string(), "cannot be written (no such folder, no permission, or the disk is full)");
   }
   std::error_code error;
   std::filesystem::rename(temporary, file, error);
-  if (error) throw InputError(file.string(), "can't be written: " + error.message());
+  if (error) throw InputError(file.string(), "cannot be written: " + error.message());
 }
 
 }  // namespace hilbrush

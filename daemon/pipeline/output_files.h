@@ -4,10 +4,10 @@
 
 namespace hilbrush {
 
-/// Makes `folder` and what is above it, where absent. @throws InputError naming the folder.
+/// Makes `folder` and its parents where they do not exist. @throws InputError naming the folder.
 void make_output_folder(const std::filesystem::path& folder);
 
-/// Replaces `file` in one step, so that it is whole or absent. @throws InputError naming the file.
+/// Replaces `file` atomically: the file is complete or unchanged. @throws InputError naming the file.
 void write_text_file(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace hilbrush

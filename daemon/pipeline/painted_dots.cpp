@@ -11,27 +11,26 @@
 namespace hilbrush {
 namespace {
 
-/// Real axes come to rest beside their targets: within the windows in which they report to be in position. Dots are
-/// farther apart than that, so that the nearest exposure is the one that was meant.
-constexpr double kAngleTolerance = 5e-4, kTravelToleranceM = 5e-5;
+/// Real axes stop beside their targets, anywhere in the window in which they report to be in position. Dots are farther
+/// apart than that, so the nearest exposure is the commanded one. In radians and meters.
+constexpr double kAngleTolerance = 5e-4;
+constexpr double kTravelToleranceM = 5e-5;
 constexpr double kOffTargetM = 10e-6;
-constexpr double kFullPulseShare = .999;  // a pulse that the device ended itself is full
+constexpr double kFullPulseShare = .999;  ///< of the commanded length; shorter pulses were cut off
 
-double tolerance_of(int axis) {
+double tolerance_of(std::size_t axis) {
   return axis == kJ3 ? kTravelToleranceM : kAngleTolerance;
 }
 
-/// How far apart two poses are, in tolerances of the worst axis.
+/// Distance of two poses: the largest difference of an axis, in tolerances of that axis.
 double distance_of(const Joints& a, const Joints& b) {
   double worst = 0;
-  for (int i = 0; i < kAxisCount; ++i) {
-    const auto axis = static_cast<std::size_t>(i);
-    worst = std::max(worst, std::abs(a[axis] - b[axis]) / tolerance_of(i));
-  }
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    worst = std::max(worst, std::abs(a[axis] - b[axis]) / tolerance_of(axis));
   return worst;
 }
 
-/// Exposures by their joints: sorted by J1, which nearly always tells them apart.
+/// Finds exposures by their joints. Sorted by J1, which differs between nearly all of them.
 class ExposureIndex {
  public:
   explicit ExposureIndex(const ExposureProgram& program) : program_(program), order_(program.exposures.size()) {
@@ -43,10 +42,12 @@ class ExposureIndex {
     const auto first = std::lower_bound(order_.begin(), order_.end(), joints[kJ1] - kAngleTolerance,
                                         [&](std::size_t i, double value) { return j1(i) < value; });
     std::optional<std::size_t> nearest;
-    double least = 1;
+    double smallest = 1;
     for (auto it = first; it != order_.end() && j1(*it) <= joints[kJ1] + kAngleTolerance; ++it) {
       const double distance = distance_of(program_.exposures[*it].joints, joints);
-      if (distance <= least) nearest = *it, least = distance;
+      if (distance > smallest) continue;
+      nearest = *it;
+      smallest = distance;
     }
     return nearest;
   }
@@ -63,10 +64,11 @@ class ExposureIndex {
 PaintedDots match_emissions(const ExposureProgram& program, std::span<const Emission> emissions,
                             std::span<const Hit> hits) {
   CHECK_EQ(emissions.size(), hits.size());
-  struct Made {
-    std::uint32_t full = 0, partial = 0;
+  struct PulseCounts {
+    std::uint32_t full = 0;
+    std::uint32_t partial = 0;
   };
-  std::vector<Made> made(program.exposures.size());
+  std::vector<PulseCounts> pulses(program.exposures.size());
   PaintedDots painted;
   const ExposureIndex index(program);
   double max_error_m = 0;
@@ -77,18 +79,18 @@ PaintedDots match_emissions(const ExposureProgram& program, std::span<const Emis
       continue;
     }
     const bool is_full = emissions[k].length_s >= kFullPulseShare * emissions[k].commanded_s;
-    ++(is_full ? made[*i].full : made[*i].partial);
+    ++(is_full ? pulses[*i].full : pulses[*i].partial);
     const double error_m = (hits[k].position_O - program.exposures[*i].position_O).norm();
     if (hits[k].is_shadowed) ++painted.hits.shadowed;
     if (!hits[k].is_hit || error_m > kOffTargetM) ++painted.hits.off_target;
     if (hits[k].is_hit) max_error_m = std::max(max_error_m, error_m);
   }
-  for (const Made& m : made) {
-    if (m.full > 0)
+  for (const PulseCounts& counts : pulses) {
+    if (counts.full > 0)
       ++painted.exposed;
-    else if (m.partial > 0)
+    else if (counts.partial > 0)
       ++painted.in_doubt;
-    if (m.full > 1) ++painted.repeated;
+    if (counts.full > 1) ++painted.repeated;
   }
   painted.hits.max_error_um = max_error_m * 1e6;
   return painted;

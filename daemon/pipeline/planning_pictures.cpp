@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
 
+#include "sampling/base/angles.h"
 #include "sampling/quality/plot.h"
 #include "sim/film/canvas.h"
 #include "sim/film/orthographic_view.h"
@@ -16,14 +16,21 @@
 namespace hilbrush {
 namespace {
 
-constexpr Color kBackground{104, 116, 130}, kSurface{150, 152, 154}, kBackFace{126, 106, 92}, kInk{245, 245, 245};
-constexpr Color kExposed{225, 228, 226}, kRetract{255, 255, 255};
-constexpr int kPad = 12, kViewPixels = 400, kScale = 2, kText = 7 * kScale;
+constexpr Color kBackground{104, 116, 130};
+constexpr Color kSurface{150, 152, 154};
+constexpr Color kBackFace{126, 106, 92};
+constexpr Color kInk{245, 245, 245};
+constexpr Color kExposed{225, 228, 226};
+constexpr Color kRetract{255, 255, 255};
+constexpr int kPad = 12;
+constexpr int kViewPixels = 400;
+constexpr int kScale = 2;
+constexpr int kText = 7 * kScale;
 
 enum Row { kReach, kIncidence, kPath, kRowCount };
 constexpr std::array<const char*, kRowCount> kRowNames{"reach", "incidence", "path"};
 
-/// By SkipReason.
+/// Indexed by SkipReason.
 constexpr std::array<Color, kSkipReasonCount> kReasonColors{{{120, 30, 160},
                                                              {20, 80, 220},
                                                              {240, 130, 0},
@@ -33,11 +40,11 @@ constexpr std::array<Color, kSkipReasonCount> kReasonColors{{{120, 30, 160},
                                                              {0, 130, 120},
                                                              {235, 80, 190}}};
 
-/// Evenly spaced colors from one end of a scale to the other.
+/// The color at `share` of a scale with evenly spaced colors.
 Color ramp(std::span<const Color> colors, double share) {
-  const double place = std::clamp(share, 0., 1.) * static_cast<double>(colors.size() - 1);
-  const std::size_t i = std::min(static_cast<std::size_t>(place), colors.size() - 2);
-  const double between = place - static_cast<double>(i);
+  const double position = std::clamp(share, 0., 1.) * static_cast<double>(colors.size() - 1);
+  const std::size_t i = std::min(static_cast<std::size_t>(position), colors.size() - 2);
+  const double between = position - static_cast<double>(i);
   Color color;
   for (std::size_t k = 0; k < color.size(); ++k)
     color[k] = static_cast<std::uint8_t>(std::lround(colors[i][k] + (colors[i + 1][k] - colors[i][k]) * between));
@@ -48,11 +55,11 @@ Color ramp(std::span<const Color> colors, double share) {
 Color incidence_color(double incidence) {
   constexpr std::array<Color, 5> kColors{
       {{49, 54, 149}, {116, 173, 209}, {254, 224, 144}, {244, 109, 67}, {165, 0, 38}}};
-  return ramp(kColors, incidence / (std::numbers::pi / 4));
+  return ramp(kColors, incidence / (45 * kDegree));
 }
 
-/// From the first exposure (violet) to the last (yellow); hues far enough apart that neighbors in time look alike and
-/// others do not.
+/// From the first exposure (violet) to the last (yellow). The hues are far enough apart that only exposures near in
+/// time look alike.
 Color order_color(double share) {
   constexpr std::array<Color, 6> kColors{
       {{70, 10, 120}, {50, 70, 200}, {20, 150, 190}, {40, 180, 90}, {170, 205, 50}, {250, 230, 30}}};
@@ -85,7 +92,7 @@ class ViewSheet {
   double tolerance_m_;
 };
 
-/// What all three rows of all views are drawn from.
+/// Draws the three rows of a view.
 struct PlanDrawing {
   const DotSequence& dots;
   const Plan& plan;
@@ -147,8 +154,7 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
                            std::to_string(counts[r]) + " " + skip_reason_name(static_cast<SkipReason>(r)));
   } else if (row == kIncidence) {
     for (const int degrees : {0, 10, 20, 30, 40, 45})
-      write_legend_entry(canvas, left, top, incidence_color(degrees * std::numbers::pi / 180),
-                         std::to_string(degrees) + " deg");
+      write_legend_entry(canvas, left, top, incidence_color(degrees * kDegree), std::to_string(degrees) + " deg");
   } else {
     write_legend_entry(canvas, left, top, order_color(0), "first");
     write_legend_entry(canvas, left, top, order_color(.5), "half way");
@@ -183,23 +189,25 @@ Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const 
   const double pixel_m = (high - low).maxCoeff() / kViewPixels;
   const PlanDrawing drawing{dots, plan, std::clamp(static_cast<int>(dots.pitch_m / pixel_m / 2), 0, kViewPixels / 20)};
   std::vector<std::pair<const char*, ViewSheet>> views;
-  int width = kPad, height = 0;
+  int width = kPad;
+  int height = 0;
   for (const ViewDirection& direction : picture_views()) {
     views.emplace_back(direction.name, ViewSheet(mesh, direction, pixel_m));
     const std::string longest = std::string(direction.name) + ", " + kRowNames[kIncidence];
     width += std::max(views.back().second.width(), Canvas::text_width(longest, kScale)) + kPad;
     height = std::max(height, views.back().second.height());
   }
-  constexpr int kNarrowest = 900;  // for the legends
+  constexpr int kMinWidth = 900;  // pixels, so that the legends fit
   const int row_height = 2 * (kText + kPad) + height + kPad;
-  Canvas canvas(std::max(width, kNarrowest), kRowCount * row_height + kPad, kBackground);
+  Canvas canvas(std::max(width, kMinWidth), kRowCount * row_height + kPad, kBackground);
   for (int row = 0; row < kRowCount; ++row) {
     int left = kPad;
     const int top = kPad + row * row_height;
     for (const auto& [name, view] : views) {
       const std::string caption = std::string(name) + ", " + kRowNames[static_cast<std::size_t>(row)];
       const int column = std::max(view.width(), Canvas::text_width(caption, kScale));
-      const int x = left + (column - view.width()) / 2, y = top + kText + kPad + (height - view.height()) / 2;
+      const int x = left + (column - view.width()) / 2;
+      const int y = top + kText + kPad + (height - view.height()) / 2;
       canvas.write(left, top, caption, kScale, kInk);
       view.draw_surface(canvas, x, y);
       if (row == kReach)

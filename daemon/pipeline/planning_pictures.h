@@ -9,19 +9,19 @@
 #include "sampling/images/image_file.h"
 #include "sampling/model/textured_mesh.h"
 
-/// Pictures of a plan for the people who sign it.
+/// Pictures of a plan, to look at before it is painted.
 namespace hilbrush {
 
-/// Six views (as in exposure.png), three rows: reach (exposed dots light, skipped ones in the color of their reason),
-/// incidence (degrees against the face normal), path (lines from dot to dot, colored from first to last; white where
-/// the tool was drawn back in between). Each row has a legend.
+/// Six views (as in exposure.png) in three rows, each with a legend. Reach: exposed dots light, skipped ones in the
+/// color of their reason. Incidence: degrees against the face normal. Path: lines from dot to dot, colored from first
+/// to last, and white where the tool retracts in between.
 Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const Plan& plan);
 
-/// The color of a reason on that sheet, sRGB.
+/// The color of a reason in that picture, sRGB.
 std::array<std::uint8_t, 3> skip_reason_color(SkipReason reason);
 
-/// Writes into `folder` planning.png, that sheet, and time.svg: what the program's time is spent on, over the
-/// exposures. Returns the files written. @throws InputError naming a file that can't be written.
+/// Writes into `folder` planning.png, the picture above, and time.svg: the time of the program, divided by what it is
+/// spent on, over the exposures. Returns the files written. @throws InputError naming a file that cannot be written.
 std::vector<std::filesystem::path> write_planning_pictures(const TexturedMesh& mesh, const DotSequence& dots,
                                                            const Plan& plan, const CellDescription& cell,
                                                            const std::filesystem::path& folder);

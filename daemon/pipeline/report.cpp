@@ -6,9 +6,9 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <numeric>
 
+#include "sampling/base/angles.h"
 #include "sampling/base/input_error.h"
 
 namespace hilbrush {
@@ -16,9 +16,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 1 / kDegree;
+constexpr std::size_t kMaxListedComponents = 32;
 
-/// Figures are for people too: six digits are more than any of them is worth, and infinities are not JSON.
+/// Rounded to six significant digits, more than the accuracy of any figure. JSON has no infinities: they become null.
 Json figure(double value) {
   if (!std::isfinite(value)) return nullptr;
   if (value == 0) return 0.0;
@@ -26,7 +27,7 @@ Json figure(double value) {
   return std::round(value * scale) / scale;
 }
 
-/// Components in the order of the curve, grouped by how they are ordered and why.
+/// The number of components by how the curve orders them, and why.
 Json orders_json(const std::vector<ComponentReport>& components) {
   std::map<std::string, std::size_t> by_reason;
   std::size_t mapped = 0;
@@ -44,7 +45,8 @@ Json orders_json(const std::vector<ComponentReport>& components) {
 }
 
 Json mesh_json(const Report::Mesh& mesh) {
-  int genus = 0, loops = 0;
+  int genus = 0;
+  int loops = 0;
   bool is_genus_known = true;
   for (const auto& component : mesh.components) {
     is_genus_known = is_genus_known && component.genus >= 0;
@@ -65,14 +67,13 @@ Json mesh_json(const Report::Mesh& mesh) {
           {"warnings", mesh.warnings}};
 }
 
-/// The largest components, with their own stretch of the path.
+/// The largest components, each with its part of the path.
 Json components_json(const std::vector<ComponentReport>& components, const std::vector<ComponentPath>& paths) {
-  constexpr std::size_t kMaxListed = 32;
   std::vector<std::size_t> order(components.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return components[a].area_m2 > components[b].area_m2; });
-  order.resize(std::min(order.size(), kMaxListed));
+  order.resize(std::min(order.size(), kMaxListedComponents));
   Json list = Json::array();
   for (const std::size_t i : order) {
     const ComponentReport& component = components[i];
@@ -135,6 +136,61 @@ Json fidelity_json(const FidelityFigures& figures) {
       {"tone_rms", figure(figures.tone_rms)}, {"tone_max", figure(figures.tone_max)}, {"p999", figure(figures.p999)}};
 }
 
+Json incidence_json(const IncidenceFigures& incidence) {
+  return {{"mean", figure(incidence.mean_deg)}, {"p95", figure(incidence.p95_deg)}, {"max", figure(incidence.max_deg)}};
+}
+
+Json time_json(const TimeSplit& time, double least_time_s) {
+  return {{"move", figure(time.move_s)},       {"settle", figure(time.settle_s)}, {"expose", figure(time.expose_s)},
+          {"retract", figure(time.retract_s)}, {"total", figure(time.total_s())}, {"least", figure(least_time_s)}};
+}
+
+Json motion_json(const MotionFigures& motion) {
+  return {{"table_poses", motion.table_poses},
+          {"retracts", motion.retracts},
+          {"elbow_flips", motion.elbow_flips},
+          {"path_mm", figure(motion.path_mm)}};
+}
+
+Json path_json(const SampleReport& path) {
+  Json json{{"length_mm", figure(path.path_length_m * 1e3)},
+            {"constant", figure(path.path_constant)},
+            {"patches", path.patch_count}};
+  json["patches_at_depth"] = path.patches_at_depth;
+  return json;
+}
+
+Json fidelity_json(const Fidelity& fidelity) {
+  Json json = fidelity_json(fidelity.reachable);
+  json["unreachable_share"] = figure(fidelity.unreachable_share);
+  json["whole"] = fidelity_json(fidelity.whole);
+  return json;
+}
+
+Json hits_json(const HitFigures& hits) {
+  return {{"max_error_um", figure(hits.max_error_um)}, {"off_target", hits.off_target}, {"shadowed", hits.shadowed}};
+}
+
+Json stages_json(const std::vector<std::pair<std::string, double>>& stages_s) {
+  Json json;
+  double total_s = 0;
+  for (const auto& [stage, seconds] : stages_s) {
+    json[stage] = figure(seconds);
+    total_s += seconds;
+  }
+  json["total"] = figure(total_s);
+  return json;
+}
+
+/// CPU time and peak memory of this process.
+void add_resources(Json& json) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  json["cpu_s"] = figure(static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+                         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec));
+  json["peak_rss_mb"] = figure(static_cast<double>(usage.ru_maxrss) / 1024);
+}
+
 }  // namespace
 
 IncidenceFigures incidence_figures(const ExposureProgram& program) {
@@ -148,8 +204,8 @@ IncidenceFigures incidence_figures(const ExposureProgram& program) {
   }
   std::sort(incidences.begin(), incidences.end());
   const std::size_t count = incidences.size();
-  return {sum / static_cast<double>(count) * kDegrees, incidences[(count - 1) * 95 / 100] * kDegrees,
-          incidences.back() * kDegrees};
+  return {sum / static_cast<double>(count) * kDegreesPerRadian, incidences[(count - 1) * 95 / 100] * kDegreesPerRadian,
+          incidences.back() * kDegreesPerRadian};
 }
 
 MotionFigures motion_figures(const ExposureProgram& program) {
@@ -157,7 +213,8 @@ MotionFigures motion_figures(const ExposureProgram& program) {
   const auto& exposures = program.exposures;
   if (!exposures.empty()) figures.table_poses = 1;
   for (std::size_t i = 1; i < exposures.size(); ++i) {
-    const Joints &from = exposures[i - 1].joints, &to = exposures[i].joints;
+    const Joints& from = exposures[i - 1].joints;
+    const Joints& to = exposures[i].joints;
     figures.path_mm += 1e3 * (exposures[i].position_O - exposures[i - 1].position_O).norm();
     if (from[kTilt] != to[kTilt] || from[kRotation] != to[kRotation]) ++figures.table_poses;
     if ((from[kJ2] >= 0) != (to[kJ2] >= 0)) ++figures.elbow_flips;
@@ -167,53 +224,24 @@ MotionFigures motion_figures(const ExposureProgram& program) {
 }
 
 std::string report_to_json(const Report& report) {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-
   Json json;
   json["mesh"] = mesh_json(report.mesh);
   json["dots"] = dots_json(report.dots);
   json["skipped"] = skipped_json(report.skipped);
   json["suggestion"] = report.advice ? advice_json(*report.advice) : Json(nullptr);
   json["pitch_mm"] = figure(report.pitch_m * 1e3);
-  json["incidence_deg"] = {{"mean", figure(report.incidence.mean_deg)},
-                           {"p95", figure(report.incidence.p95_deg)},
-                           {"max", figure(report.incidence.max_deg)}};
-  json["time_s"] = {{"move", figure(report.time.move_s)},     {"settle", figure(report.time.settle_s)},
-                    {"expose", figure(report.time.expose_s)}, {"retract", figure(report.time.retract_s)},
-                    {"total", figure(report.time.total_s())}, {"least", figure(report.least_time_s)}};
-  json["motion"] = {{"table_poses", report.motion.table_poses},
-                    {"retracts", report.motion.retracts},
-                    {"elbow_flips", report.motion.elbow_flips},
-                    {"path_mm", figure(report.motion.path_mm)}};
-  const SampleReport& path = report.picture.path;
-  json["path"] = {{"length_mm", figure(path.path_length_m * 1e3)},
-                  {"constant", figure(path.path_constant)},
-                  {"patches", path.patch_count}};
-  json["path"]["patches_at_depth"] = path.patches_at_depth;
-  json["components"] = components_json(report.mesh.components, path.components);
+  json["incidence_deg"] = incidence_json(report.incidence);
+  json["time_s"] = time_json(report.time, report.least_time_s);
+  json["motion"] = motion_json(report.motion);
+  json["path"] = path_json(report.picture.path);
+  json["components"] = components_json(report.mesh.components, report.picture.path.components);
   json["filled"] = report.picture.filled.added;
   json["levels"] = report.picture.dots_of_level;
   json["predictive"] = predictive_json(report.picture.predictive);
-  if (report.fidelity) {
-    json["fidelity"] = fidelity_json(report.fidelity->reachable);
-    json["fidelity"]["unreachable_share"] = figure(report.fidelity->unreachable_share);
-    json["fidelity"]["whole"] = fidelity_json(report.fidelity->whole);
-  }
-  if (report.hits) {
-    json["hits"] = {{"max_error_um", figure(report.hits->max_error_um)},
-                    {"off_target", report.hits->off_target},
-                    {"shadowed", report.hits->shadowed}};
-  }
-  double total_s = 0;
-  for (const auto& [stage, seconds] : report.stages_s) {
-    json["stages_s"][stage] = figure(seconds);
-    total_s += seconds;
-  }
-  json["stages_s"]["total"] = figure(total_s);
-  json["cpu_s"] = figure(static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-                         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec));
-  json["peak_rss_mb"] = figure(static_cast<double>(usage.ru_maxrss) / 1024);
+  if (report.fidelity) json["fidelity"] = fidelity_json(*report.fidelity);
+  if (report.hits) json["hits"] = hits_json(*report.hits);
+  json["stages_s"] = stages_json(report.stages_s);
+  add_resources(json);
   json["files"] = report.files;
   json["settings"] = Json::parse(report.settings_json);
   json["seed"] = report.seed;
@@ -228,11 +256,11 @@ auto read_report(const std::filesystem::path& report_file, const Read& read) {
   std::ifstream in(report_file);
   if (!in)
     throw InputError(report_file.string(),
-                     "can't be read; `develop` needs the report that `plan` wrote beside the program");
+                     "cannot be read; `develop` needs the report that `plan` wrote beside the program");
   try {
     return read(Json::parse(in));
   } catch (const Json::exception& error) {
-    throw InputError(report_file.string(), std::string("is no report of this program: ") + error.what());
+    throw InputError(report_file.string(), std::string("is not a report of this program: ") + error.what());
   }
 }
 

@@ -14,18 +14,21 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kFieldPitches = 60, kFieldLeastM = .010, kGapM = .003;
-/// Closer together where paint bends most.
+constexpr double kFieldPitches = 60;
+constexpr double kMinFieldM = .010;
+constexpr double kGapM = .003;
+/// Of asked_max. Closer together where the response of paint is most curved.
 constexpr std::array kShares{.02, .05, .08, .12, .16, .2, .25, .3, .36, .43, .5, .6, .7, .8, .9, 1.};
 static_assert(kShares.size() == WedgeCard::kColumns * WedgeCard::kRows);
-constexpr std::size_t kFormBytesMax = 1u << 20, kStepsMax = 1000;
+constexpr std::size_t kMaxFormBytes = 1u << 20;
+constexpr std::size_t kMaxSteps = 1000;
 
 /// IEC 61966-2-1, as model files store colors.
 double srgb_of_linear(double linear) {
   return linear <= .0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - .055;
 }
 
-/// Where the lines between gaps and fields run: gap, field, gap, ..., gap.
+/// Positions of the lines between gaps and fields: gap, field, gap, ..., gap.
 std::vector<double> lines(int fields, const WedgeCard& card) {
   std::vector<double> at{0};
   for (int i = 0; i < fields; ++i) {
@@ -38,7 +41,7 @@ std::vector<double> lines(int fields, const WedgeCard& card) {
 
 double coverage_of(const JsonObject& json, double reflectance, const CellDescription::Paint& paint) {
   const double coverage = (paint.reflectance_white - reflectance) / (paint.reflectance_white - paint.reflectance_black);
-  constexpr double kNoise = .05;  // readings of white and black scatter around the paint's own
+  constexpr double kNoise = .05;  // coverage; readings of white and black scatter around the values of the cell file
   if (coverage < -kNoise || coverage > 1 + kNoise)
     json.refuse("reflectance", "is lighter than the paint's reflectance_white or darker than its reflectance_black");
   return std::clamp(coverage, 0., 1.);
@@ -47,10 +50,10 @@ double coverage_of(const JsonObject& json, double reflectance, const CellDescrip
 WedgeStep read_step(JsonObject& json, const CellDescription& cell) {
   WedgeStep step;
   step.asked = json.number("asked", {0, cell.paint.asked_max});
-  json.optional_integer("row", 1, kStepsMax);  // for people only
-  json.optional_integer("column", 1, kStepsMax);
-  const auto painted = json.optional_number("painted", {0, 1}),
-             reflectance = json.optional_number("reflectance", {0, 1});
+  json.optional_integer("row", 1, kMaxSteps);  // to find the field on the card
+  json.optional_integer("column", 1, kMaxSteps);
+  const auto painted = json.optional_number("painted", {0, 1});
+  const auto reflectance = json.optional_number("reflectance", {0, 1});
   if (painted && reflectance) json.refuse("reflectance", "contradicts painted: give one of the two");
   if (!painted && !reflectance) json.refuse("painted", "has no reading yet: measure the field and fill it in");
   step.painted = painted ? *painted : coverage_of(json, *reflectance, cell.paint);
@@ -68,21 +71,24 @@ void refuse_other_placement(JsonObject& json, const JobSettings& settings) {
   refuse_other("levels", std::to_string(json.integer("levels", 1, 4)), std::to_string(settings.levels));
   const double dpi = json.number("dpi", {10, 1200});
   if (!settings.dpi || std::abs(dpi - *settings.dpi) > 1e-6 * dpi)
-    json.refuse("dpi", "the settings say another: give the settings it was painted with (--settings wedge.json)");
+    json.refuse("dpi", "the settings have another: give the settings it was painted with (--settings wedge.json)");
 }
 
 }  // namespace
 
 WedgeCard wedge_card(double pitch_m, double asked_max, std::span<const double> levels) {
-  return {std::max(kFieldPitches * pitch_m, kFieldLeastM), kGapM,
+  return {std::max(kFieldPitches * pitch_m, kMinFieldM), kGapM,
           wedge_steps({kShares.begin(), kShares.end()}, asked_max, levels)};
 }
 
 std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& paint) {
-  const std::vector<double> x = lines(WedgeCard::kColumns, card), z = lines(WedgeCard::kRows, card);
-  const int columns = static_cast<int>(x.size()) - 1, rows = static_cast<int>(z.size()) - 1;
+  const std::vector<double> x = lines(WedgeCard::kColumns, card);
+  const std::vector<double> z = lines(WedgeCard::kRows, card);
+  const int columns = static_cast<int>(x.size()) - 1;
+  const int rows = static_cast<int>(z.size()) - 1;
   std::ostringstream points, faces, colors;
-  points.precision(12), colors.precision(9);
+  points.precision(12);
+  colors.precision(9);
   for (const double pz : z)
     for (const double px : x) points << px << " 0 " << pz << ", ";
   for (int row = 0; row < rows; ++row)
@@ -114,7 +120,9 @@ JobSettings wedge_settings(const JobSettings& settings) {
   wedge.untextured = Untextured::kMaterial;
   wedge.predictive_rounds = 0;
   wedge.largest_gap_pitches.reset();
-  wedge.size_mm.reset(), wedge.units_mm.reset(), wedge.up.reset();
+  wedge.size_mm.reset();
+  wedge.units_mm.reset();
+  wedge.up.reset();
   return wedge;
 }
 
@@ -136,9 +144,9 @@ std::string wedge_form(const WedgeCard& card, const JobSettings& settings) {
 std::vector<WedgeStep> read_wedge_form(const std::filesystem::path& file, const JobSettings& settings,
                                        const CellDescription& cell) {
   std::vector<WedgeStep> steps;
-  read_json_object(read_text_file(file.string(), kFormBytesMax), file.string(), [&](JsonObject& json) {
+  read_json_object(read_text_file(file.string(), kMaxFormBytes), file.string(), [&](JsonObject& json) {
     refuse_other_placement(json, settings);
-    json.objects("steps", kStepsMax, [&](JsonObject& step) { steps.push_back(read_step(step, cell)); });
+    json.objects("steps", kMaxSteps, [&](JsonObject& step) { steps.push_back(read_step(step, cell)); });
   });
   return steps;
 }

@@ -78,7 +78,7 @@ TEST_F(WedgeForm, MistakesAreRefusedWithTheirPath) {
   EXPECT_NE(error_of(other).find("$.sampler: the wedge was painted with even"), std::string::npos) << error_of(other);
   other = form_;
   other["dpi"] = 200;
-  EXPECT_NE(error_of(other).find("$.dpi: the settings say another"), std::string::npos) << error_of(other);
+  EXPECT_NE(error_of(other).find("$.dpi: the settings have another"), std::string::npos) << error_of(other);
   other = form_;
   other["steps"][2]["x"] = 1;
   EXPECT_NE(error_of(other).find("$.steps[2].x: unknown key"), std::string::npos) << error_of(other);
