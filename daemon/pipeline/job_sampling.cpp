@@ -43,6 +43,14 @@ CellTone job_tone(const CellDescription& cell, const JobSettings& settings, cons
   return tone;
 }
 
+PlacementOptions placement_options(const JobSettings& settings) {
+  PlacementOptions options;
+  if (settings.size_mm) options.size_m = *settings.size_mm * 1e-3;
+  if (settings.units_mm) options.unit_m = *settings.units_mm * 1e-3;
+  if (settings.up) options.up = *settings.up == "y" ? UpAxis::kY : UpAxis::kZ;
+  return options;
+}
+
 PictureOptions picture_options(const CellDescription& cell, const JobSettings& settings) {
   PictureOptions options;
   options.sample = sample_options(settings);

@@ -26,7 +26,7 @@
 #include "sampling/base/input_error.h"
 #include "sampling/base/sha256.h"
 #include "sampling/curve/curvature.h"
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface_curve.h"
 #include "sampling/dots/dots_file.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
@@ -42,7 +42,7 @@
 namespace hilbrush {
 namespace {
 
-/// Names the stage that runs, forwards its progress and keeps its seconds.
+/// Runs stages: reports their progress and measures their time.
 class Stages {
  public:
   explicit Stages(const PipelineListener& listener) : listener_(listener) {}
@@ -50,8 +50,8 @@ class Stages {
   template <class Work>
   auto run(const char* stage, Work work) {
     const auto begin = std::chrono::steady_clock::now();
-    tell(stage, 0);
-    auto result = work([this, stage](double fraction) { tell(stage, fraction); });
+    report_progress(stage, 0);
+    auto result = work([this, stage](double fraction) { report_progress(stage, fraction); });
     seconds_.emplace_back(stage, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     return result;
   }
@@ -61,7 +61,7 @@ class Stages {
   const std::vector<std::pair<std::string, double>>& seconds() const { return seconds_; }
 
  private:
-  void tell(const char* stage, double fraction) const {
+  void report_progress(const char* stage, double fraction) const {
     if (listener_.on_progress) listener_.on_progress(stage, fraction);
   }
 
@@ -76,16 +76,7 @@ std::string hash_of_files(const std::vector<std::filesystem::path>& files) {
   return hash.hex_digest();
 }
 
-PlacementOptions placement_options(const JobSettings& settings) {
-  PlacementOptions options;
-  if (settings.size_mm) options.size_m = *settings.size_mm * 1e-3;
-  if (settings.units_mm) options.unit_m = *settings.units_mm * 1e-3;
-  if (settings.up) options.up = *settings.up == "y" ? UpAxis::kY : UpAxis::kZ;
-  return options;
-}
-
-/// The object on the table: everything that later stages look at but never edit. Members refer to each other, so it
-/// never moves.
+/// The object on the table: what later stages read but never change. Members refer to each other, so it is not moved.
 struct Workpiece {
   Workpiece(const PipelineRequest& request, Stages& stages)
       : cell(with_fixture(load_cell(request.cell_file), mounting_options(request.settings))),
@@ -153,7 +144,7 @@ void refuse_faulty_program(const std::vector<ProgramFault>& faults) {
 
 DotSequence sample_dots(Workpiece& piece, Stages& stages) {
   const auto curve = stages.run("curve", [&](const Progress& progress) {
-    // Laminar slices walk no curve; what the report says of the surface comes from one all the same.
+    // Laminar slices need no curve, but the report's figures about the surface come from one.
     const CurveKind kind = piece.settings.curve == CurveKind::kLaminar ? CurveKind::kHilbert : piece.settings.curve;
     return std::make_unique<SurfaceCurve>(piece.mesh, kind, progress);
   });
@@ -216,7 +207,7 @@ std::vector<Emission> paint_in_simulation(const ExposureProgram& program, CellDe
 
   Journal journal = Journal::in_memory(program.exposures.size());
   ExecutionControl control;
-  std::vector<Joints> approach;  // the program's own way from home
+  std::vector<Joints> approach;  // from home, as the program has it
   for (const Via& via : program.vias_before(0)) approach.push_back(via.joints);
   const auto total = static_cast<double>(std::max<std::size_t>(program.exposures.size(), 1));
   const ExecutionResult result = execute(program, approach, cell, description, journal, control,
@@ -237,7 +228,7 @@ std::vector<Eigen::Vector3d> positions_of_unexposed(const DotSequence& dots, con
   return positions;
 }
 
-/// Film, fidelity and pictures from what was emitted; completes the report.
+/// Film, fidelity and pictures from the recorded emissions; completes the report.
 void develop_and_judge(Workpiece& piece, const Reach& reach, const PlannedWork& work,
                        std::span<const Emission> emissions, const std::filesystem::path& output, Stages& stages) {
   Report& report = piece.report;
@@ -316,7 +307,7 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
   piece.report.skipped = skipped_figures_from_report(program_file.parent_path() / "report.json");
   const auto emissions = read_emission_record(emissions_file);
 
-  // Sampling is deterministic: the dots are made again rather than read, so that the mesh's report is whole too.
+  // Sampling is deterministic: placing the dots again, instead of reading them, completes the report of the mesh too.
   work.dots = sample_dots(piece, stages);
   piece.report.dots = planned;
   piece.report.pitch_m = work.plan.program.pitch_m;

@@ -8,7 +8,7 @@
 
 #include "daemon/pipeline/quality/measured_set.h"
 
-/// The figures of one set of dots, as values and as JSON.
+/// The quality figures of one set of dots, as values and as JSON.
 namespace hilbrush {
 
 struct SizedFigures {
@@ -17,15 +17,15 @@ struct SizedFigures {
   std::optional<Spacing> spacing;
   std::optional<double> largest_hole, path_constant;
   std::optional<Spectrum> spectrum;
-  std::string no_spectrum;  ///< why there is none
+  std::string no_spectrum;  ///< the reason if there is no spectrum
 };
 
 SizedFigures measure(const MeasuredSet& set, const MeasuredDots& dots, const TestShapes& shapes);
 
-/// Without histogram and rings unless `is_whole`.
+/// `is_whole`: with histogram and rings of the spectrum.
 nlohmann::ordered_json json_of(const SizedFigures& figures, bool is_whole);
 
-/// Slopes over the counts by test shapes; empty for a single count.
+/// Slopes of the discrepancies over the counts, by test shapes; empty for a single count.
 nlohmann::ordered_json slopes_of(const std::vector<SizedFigures>& sizes);
 
 }  // namespace hilbrush

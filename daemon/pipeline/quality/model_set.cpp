@@ -9,14 +9,15 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 
 namespace hilbrush {
 namespace {
 
-/// All figures are relative: any size will do.
+/// All figures are relative, so any size is right.
 constexpr double kSizeM = .1;
 
-/// What dots follow on a model.
+/// What the density of dots on a model follows.
 const std::vector<std::string> kDensities{"constant", "texture", "mean_curvature", "gaussian_curvature"};
 constexpr std::size_t kConstant = 0;
 
@@ -54,7 +55,7 @@ class ModelSet : public MeasuredSet {
     options_.seed = request.seed;
     if (density_ != kConstant)
       notes.emplace_back(
-          "dots are held against the tone that asks for them: shares by asked tone times area, lengths over the local "
+          "dots are compared with the tone that asks for them: shares by asked tone times area, lengths over the local "
           "pitch");
   }
 
@@ -83,7 +84,7 @@ class ModelSet : public MeasuredSet {
   SampleOptions options_;
 };
 
-/// What a dry run placed, read from its file, on its model.
+/// The dots of a dry run, read from its file, on its model.
 class DotsSet : public MeasuredSet {
  public:
   explicit DotsSet(const QualityRequest& request)
@@ -97,11 +98,11 @@ class DotsSet : public MeasuredSet {
     for (const auto& [value, path] : {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
                                       std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"},
                                       std::pair{request.points, "$.points"}})
-      if (!value.empty()) throw InputError(path, "is of no use with dots that are placed already");
-    if (!request.counts.empty()) throw InputError("$.count", "is of no use with dots that are placed already");
+      if (!value.empty()) throw InputError(path, "has no effect on dots that are placed already");
+    if (!request.counts.empty()) throw InputError("$.count", "has no effect on dots that are placed already");
     project_to_surface();
     notes.emplace_back(
-        "dots are held against the wanted tone after the tone curve: shares by asked tone times area, "
+        "dots are compared with the wanted tone after the tone curve: shares by asked tone times area, "
         "lengths over the local pitch");
   }
 
@@ -111,27 +112,24 @@ class DotsSet : public MeasuredSet {
 
  private:
   static TexturedMesh load(const std::string& file, const JobSettings& settings) {
-    PlacementOptions placement;
-    if (settings.size_mm) placement.size_m = *settings.size_mm * 1e-3;
-    if (settings.units_mm) placement.unit_m = *settings.units_mm * 1e-3;
-    if (settings.up) placement.up = *settings.up == "y" ? UpAxis::kY : UpAxis::kZ;
-    const RepairedMesh repaired = repair_mesh(place_on_table(load_model(file, load_image_file), placement));
+    const RepairedMesh repaired =
+        repair_mesh(place_on_table(load_model(file, load_image_file), placement_options(settings)));
     return with_curvature_density(repaired.mesh, settings.density);
   }
   static ToneOptions tone_of(const JobSettings& settings, const TexturedMesh& mesh) {
     return job_tone(load_cell(find_cell(settings.cell)), settings, mesh).options;  // it warned when it was planned
   }
 
-  /// Gives the dots back their triangles, and refuses a model that they do not lie on.
+  /// Finds the triangles of the dots, and refuses a model that they do not lie on.
   void project_to_surface() {
     const auto box = bounds(mesh_);
-    const double far = 1e-3 * (box[1] - box[0]).norm();
+    const double tolerance_m = 1e-3 * (box[1] - box[0]).norm();
     std::size_t astray = 0;
     for (Dot& dot : sequence_.dots) {
       const SurfacePoint point = surface_.nearest(dot.position_O);
       dot.triangle = point.triangle;
       dot.normal_O = face_normal(mesh_, point).cast<float>();
-      if ((position(mesh_, point) - dot.position_O).norm() > far) ++astray;
+      if ((position(mesh_, point) - dot.position_O).norm() > tolerance_m) ++astray;
     }
     if (astray > 0)
       throw InputError("$.model", std::to_string(astray) + " of " + std::to_string(sequence_.dots.size()) +

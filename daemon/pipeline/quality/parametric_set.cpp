@@ -44,13 +44,13 @@ class ParametricSet : public MeasuredSet {
     options_.density =
         static_cast<ParametricDensity>(choice_of(request.density, parametric_density_names(), 0, "$.density"));
     options_.seed = request.seed;
-    if (!request.points.empty()) take_rival(request);
-    // A sphere's triangles are off by 1.5e-4 of its radius; the plane needs no more than two.
+    if (!request.points.empty()) use_point_set(request);
+    // 128 by 128 quads: the triangles of a sphere are off by 1.5e-4 of its radius. The plane needs only two triangles.
     mesh_ = triangles_of(*formula_, shape == ParametricShape::kPlane ? 1 : 128);
     if (options_.density == ParametricDensity::kConstant)
       surface_.emplace(mesh_);
     else
-      notes.emplace_back("the density varies over the surface: the dots are shown, but not held against it");
+      notes.emplace_back("the density varies over the surface: the dots are shown, but not compared with it");
     if (shape != ParametricShape::kPlane && surface_)
       notes.push_back("balls, spectrum and spacing are measured on the formula's " +
                       std::to_string(mesh_.triangle_count()) + " triangles");
@@ -58,11 +58,11 @@ class ParametricSet : public MeasuredSet {
 
   MeasuredDots place(std::uint64_t count) const override {
     MeasuredDots placed;
-    if (rival_) {
+    if (point_set_) {
       if (shape_ == ParametricShape::kPlane)
-        placed.plane_points = plane_set(*rival_, count, options_.seed);
+        placed.plane_points = plane_set(*point_set_, count, options_.seed);
       else
-        placed.directions = sphere_set(*rival_, count, options_.seed);
+        placed.directions = sphere_set(*point_set_, count, options_.seed);
       for (const Vector2d& p : placed.plane_points) placed.dots.push_back(dot_at({p.x(), p.y(), 0}));
       for (const Vector3d& p : placed.directions) placed.dots.push_back(dot_at(p));
       return placed;
@@ -90,21 +90,21 @@ class ParametricSet : public MeasuredSet {
 
   bool is_sphere() const { return shape_ == ParametricShape::kSphere || shape_ == ParametricShape::kEqualAreaSphere; }
 
-  void take_rival(const QualityRequest& request) {
+  void use_point_set(const QualityRequest& request) {
     if (shape_ != ParametricShape::kPlane && !is_sphere())
       throw InputError("$.points", "is for the plane and the sphere only");
     for (const auto& [name, path] : {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
                                      std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"}})
-      if (!name.empty()) throw InputError(path, "is of no use with points, which are not placed along a curve");
-    rival_ = static_cast<PlaneSet>(choice_of(request.points, plane_set_names(), 0, "$.points"));
+      if (!name.empty()) throw InputError(path, "has no effect on points, which are not placed along a curve");
+    point_set_ = static_cast<PlaneSet>(choice_of(request.points, plane_set_names(), 0, "$.points"));
   }
 
-  Dot dot_at(const Vector3d& place) const {
+  Dot dot_at(const Vector3d& position) const {
     Dot dot;
-    dot.position_O = place;
+    dot.position_O = position;
     dot.normal_O = dot.smooth_normal_O = Eigen::Vector3f::Zero();
     if (!surface_) return dot;
-    const SurfacePoint point = surface_->nearest(place);
+    const SurfacePoint point = surface_->nearest(position);
     dot.triangle = point.triangle;
     dot.normal_O = dot.smooth_normal_O = face_normal(mesh_, point).cast<float>();
     return dot;
@@ -114,7 +114,7 @@ class ParametricSet : public MeasuredSet {
   std::unique_ptr<ParametricSurface> formula_;
   TexturedMesh mesh_;
   ParametricOptions options_;
-  std::optional<PlaneSet> rival_;
+  std::optional<PlaneSet> point_set_;
   std::optional<SurfaceQuality> surface_;
 };
 

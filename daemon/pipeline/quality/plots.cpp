@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sampling/base/angles.h"
 #include "sampling/quality/plot.h"
 
 namespace hilbrush {
@@ -10,7 +11,7 @@ namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-constexpr std::size_t kMaxShown = 30'000;  ///< dots in a picture: more make one black and the file large
+constexpr std::size_t kMaxShown = 30'000;  ///< dots in a picture: with more it is black and its file large
 
 Plot discrepancy_plot(const std::string& title, const std::vector<SizedFigures>& sizes) {
   Plot plot{"Discrepancy: " + title, "dots", "rms error of the test shapes' shares", true, true, {}, {}, {}};
@@ -86,21 +87,27 @@ Plot neighbor_plot(const std::string& title, const Spacing& spacing) {
   return plot;
 }
 
-/// The square as it is; a surface from the side, only what faces the reader.
+/// The square as it is; a surface seen from the side, without the dots on its back.
 PointPicture picture_of(const MeasuredDots& dots) {
-  constexpr double kTurn_deg = 30, kHeight_deg = 25;
+  constexpr double kTurn_deg = 30;
+  constexpr double kHeight_deg = 25;
   PointPicture picture;
   if (!dots.plane_points.empty()) {
     picture.points = dots.plane_points;
   } else {
-    const double turn = kTurn_deg * EIGEN_PI / 180, height = kHeight_deg * EIGEN_PI / 180;
+    const double turn = kTurn_deg * kDegree;
+    const double height = kHeight_deg * kDegree;
     const Vector3d eye(std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn), std::sin(height));
     for (const Dot& dot : dots.dots)
       if (dot.normal_O.isZero() || dot.normal_O.cast<double>().dot(eye) > 0)
         picture.points.push_back(project(dot.position_O, kTurn_deg, kHeight_deg));
   }
-  Vector2d low = picture.points.empty() ? Vector2d::Zero() : picture.points.front(), high = low;
-  for (const Vector2d& p : picture.points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  Vector2d low = picture.points.empty() ? Vector2d::Zero() : picture.points.front();
+  Vector2d high = low;
+  for (const Vector2d& p : picture.points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
   const Vector2d extent = high - low;
   picture.radius = .25 * std::sqrt(std::max(extent.prod(), 1e-300) /
                                    static_cast<double>(std::max<std::size_t>(picture.points.size(), 1)));

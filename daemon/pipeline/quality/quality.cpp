@@ -41,12 +41,12 @@ std::string title_of(const QualityRequest& request) {
   return title;
 }
 
-/// Section 5.4: for the curves through the square.
+/// Section 5.4 of the thesis: the coherence of the curves through the square.
 Json measure_coherence(const QualityRequest& request, const std::filesystem::path& output,
                        std::vector<std::string>& files) {
   Json json = Json::object();
   for (const PlaneCurve curve : {PlaneCurve::kHilbert, PlaneCurve::kPeano2, PlaneCurve::kZ, PlaneCurve::kRows}) {
-    const int depth = curve == PlaneCurve::kPeano2 ? 9 : 12;  // as the thesis has it
+    const int depth = curve == PlaneCurve::kPeano2 ? 9 : 12;  // as in the thesis
     const Coherence coherence = spatial_coherence(curve, depth, {request.shapes, request.seed});
     json[plane_curve_name(curve)] = {{"correlation", coherence.correlation}, {"hoelder", coherence.hoelder}};
     files.push_back(write_coherence(curve, coherence, output));
@@ -88,10 +88,10 @@ QualityRequest quality_request_from_json(const std::string& text) {
 
 std::string run_quality(const QualityRequest& request, const std::filesystem::path& output,
                         const PipelineListener& listener) {
-  const auto tell = [&](const char* stage, double fraction) {
+  const auto report_progress = [&](const char* stage, double fraction) {
     if (listener.on_progress) listener.on_progress(stage, fraction);
   };
-  tell("load", 0);
+  report_progress("load", 0);
   const std::unique_ptr<MeasuredSet> set = make_measured_set(request);
   make_output_folder(output);
   for (const std::string& note : set->notes)
@@ -102,12 +102,12 @@ std::string run_quality(const QualityRequest& request, const std::filesystem::pa
   std::vector<SizedFigures> sizes;
   MeasuredDots dots;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    tell("measure", static_cast<double>(i) / static_cast<double>(counts.size()));
+    report_progress("measure", static_cast<double>(i) / static_cast<double>(counts.size()));
     dots = set->place(counts[i]);
     sizes.push_back(measure(*set, dots, shapes));
   }
 
-  tell("images", 0);
+  report_progress("images", 0);
   Json json{{"set", json_of(request, *set)}, {"sizes", Json::array()}};
   for (const SizedFigures& figures : sizes) json["sizes"].push_back(json_of(figures, &figures == &sizes.back()));
   if (const Json slopes = slopes_of(sizes); !slopes.empty()) json["slopes"] = slopes;
