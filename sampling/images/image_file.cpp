@@ -9,6 +9,7 @@
 #include <fstream>
 #include <mutex>
 #include <string_view>
+#include <utility>
 
 #include "sampling/base/input_error.h"
 #include "sampling/base/text.h"
@@ -18,8 +19,8 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr int kMaxSide = 1 << 16;
-constexpr std::size_t kStripRows = 64;
+constexpr int kMaxSidePixels = 1 << 16;
+constexpr std::size_t kStripRows = 64;  ///< read at once: bounds the memory beside the texture's own
 
 double srgb_to_linear(double encoded) {
   return encoded <= .04045 ? encoded / 12.92 : std::pow((encoded + .055) / 1.055, 2.4);
@@ -60,7 +61,8 @@ bool is_truncated_jpeg(std::string_view bytes) {
   return scan == std::string_view::npos || bytes.find("\xff\xd9"sv, scan) == std::string_view::npos;
 }
 
-/// What is wrong with a PNG's chain of chunks, or empty. libpng finds out as well, but tells stderr first.
+/// What is wrong with a PNG's chain of chunks, or empty. libpng finds out as well, but writes to
+/// stderr first.
 std::string png_fault(std::string_view bytes) {
   const auto number = [&](std::size_t at) {
     std::uint32_t value = 0;
@@ -81,32 +83,21 @@ std::string png_fault(std::string_view bytes) {
   return "the PNG picture is truncated";
 }
 
-std::optional<std::string> read_bytes(const path& file, std::size_t limit, std::string& reason) {
+Result<std::string> read_bytes(const path& file, std::size_t limit) {
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
-  if (error || !std::filesystem::exists(status)) {
-    reason = "there is no such file";
-    return std::nullopt;
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    reason = "it is not a regular file";
-    return std::nullopt;
-  }
+  if (error || !std::filesystem::exists(status)) return Failure{"there is no such file"};
+  if (!std::filesystem::is_regular_file(status)) return Failure{"it is not a regular file"};
   const auto size = std::filesystem::file_size(file, error);
-  if (error || size > limit) {
-    reason = error ? "its size can't be read" : "the file is larger than " + std::to_string(limit >> 20) + " MB";
-    return std::nullopt;
-  }
+  if (error) return Failure{"its size cannot be read"};
+  if (size > limit) return Failure{"the file is larger than " + std::to_string(limit >> 20) + " MB"};
   std::ifstream in(file, std::ios::binary);
   std::string bytes(size, '\0');
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    reason = "it can't be read";
-    return std::nullopt;
-  }
+  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) return Failure{"it cannot be read"};
   return bytes;
 }
 
-/// OpenImageIO paints a GIF's whole canvas before anyone can ask for its size.
+/// OpenImageIO allocates a GIF's whole canvas before its size can be asked for.
 std::size_t gif_pixels(std::string_view bytes) {
   const auto number = [&](std::size_t at) {
     return std::size_t{static_cast<unsigned char>(bytes[at])} +
@@ -118,7 +109,7 @@ std::size_t gif_pixels(std::string_view bytes) {
 /// What is wrong with the header, or empty.
 std::string header_fault(const OIIO::ImageSpec& spec, std::size_t pixel_limit) {
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1) return "it is not a flat picture";
-  if (spec.width > kMaxSide || spec.height > kMaxSide ||
+  if (spec.width > kMaxSidePixels || spec.height > kMaxSidePixels ||
       static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) > pixel_limit)
     return "it has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
            " pixels, more than the limit allows (" + std::to_string(pixel_limit) + " left)";
@@ -175,7 +166,7 @@ template <class Value>
 bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, TextureFiller& filler) {
   // A tiled file is read by whole rows of tiles.
   const int step = spec.tile_height > 0 ? spec.tile_height : static_cast<int>(kStripRows);
-  if (step > kMaxSide || spec.tile_width > kMaxSide) return false;
+  if (step > kMaxSidePixels || spec.tile_width > kMaxSidePixels) return false;
   const auto channels = static_cast<std::size_t>(spec.nchannels);
   std::vector<Value> strip(static_cast<std::size_t>(std::min(step, spec.height)) *
                            static_cast<std::size_t>(spec.width) * channels);
@@ -196,70 +187,65 @@ bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeD
   return true;
 }
 
-/// OpenImageIO's messages may span lines; a reason is one sentence.
+/// OpenImageIO's messages may span lines; a reason is one line.
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
 }
 
+/// Why OpenImageIO must not see the bytes, or empty.
+std::string fault_before_decoding(const std::string& format, std::string_view bytes, std::size_t pixel_limit) {
+  if (format.empty()) return "it is not a PNG, JPEG, GIF, TGA, BMP or TIFF picture";
+  if (format == "jpeg" && is_truncated_jpeg(bytes)) return "the JPEG picture is truncated";
+  if (format == "png") return png_fault(bytes);
+  if (format == "gif" && gif_pixels(bytes) > pixel_limit)
+    return "it has more pixels than the limit allows (" + std::to_string(pixel_limit) + " left)";
+  return "";
+}
+
+/// @throws what OpenImageIO throws
+Result<Texture> decode(const path& file, const std::string& format, std::size_t pixel_limit) {
+  auto input = OIIO::ImageInput::create(format);
+  OIIO::ImageSpec spec;
+  OIIO::ImageSpec config;
+  config["oiio:UnassociatedAlpha"] = 1;
+  if (!input || !input->open(file.string(), spec, config)) {
+    const std::string fault = input ? input->geterror() : OIIO::geterror();
+    return Failure{"the " + format + " picture cannot be read: " + one_line(fault)};
+  }
+  if (std::string fault = header_fault(spec, pixel_limit); !fault.empty()) return Failure{std::move(fault)};
+  Texture texture;
+  texture.width = spec.width;
+  texture.height = spec.height;
+  texture.channels = spec.nchannels;
+  texture.name = file.filename().string();
+  const bool is_float = spec.format.is_floating_point();
+  TextureFiller filler(texture, is_float);
+  const bool ok = is_float ? read_rows<float>(*input, spec, OIIO::TypeDesc::FLOAT, filler)
+                           : read_rows<std::uint16_t>(*input, spec, OIIO::TypeDesc::UINT16, filler);
+  const std::string fault = input->geterror();
+  input->close();
+  if (!ok || !fault.empty()) return Failure{"the " + format + " picture is truncated or corrupt: " + one_line(fault)};
+  filler.finish();
+  return texture;
+}
+
 }  // namespace
 
-std::optional<Texture> load_image_file(const path& file, std::size_t pixel_limit, std::string& reason) {
+Result<Texture> load_image_file(const path& file, std::size_t pixel_limit) {
   static std::once_flag limits_set;
   std::call_once(limits_set, [] { OIIO::attribute("limits:imagesize_MB", 512); });
 
   // No useful picture has more than 16 bytes a pixel in its file, but small ones may carry metadata.
-  const auto bytes =
-      read_bytes(file, (std::size_t{16} << 20) + 16 * std::min<std::size_t>(pixel_limit, 16u << 20), reason);
-  if (!bytes) return std::nullopt;
+  const auto bytes = read_bytes(file, (std::size_t{16} << 20) + 16 * std::min<std::size_t>(pixel_limit, 16u << 20));
+  if (!bytes) return Failure{bytes.reason()};
   const std::string format = format_name(file, *bytes);
-  if (format.empty()) {
-    reason = "it is not a PNG, JPEG, GIF, TGA, BMP or TIFF picture";
-    return std::nullopt;
-  }
-  if (format == "jpeg" && is_truncated_jpeg(*bytes)) {
-    reason = "the JPEG picture is truncated";
-    return std::nullopt;
-  }
-  if (format == "png") {
-    reason = png_fault(*bytes);
-    if (!reason.empty()) return std::nullopt;
-  }
-  if (format == "gif" && gif_pixels(*bytes) > pixel_limit) {
-    reason = "it has more pixels than the limit allows (" + std::to_string(pixel_limit) + " left)";
-    return std::nullopt;
-  }
+  if (std::string fault = fault_before_decoding(format, *bytes, pixel_limit); !fault.empty())
+    return Failure{std::move(fault)};
   try {
-    auto input = OIIO::ImageInput::create(format);
-    OIIO::ImageSpec spec, config;
-    config["oiio:UnassociatedAlpha"] = 1;
-    if (!input || !input->open(file.string(), spec, config)) {
-      const std::string fault = input ? input->geterror() : OIIO::geterror();
-      reason = "the " + format + " picture can't be read: " + one_line(fault);
-      return std::nullopt;
-    }
-    reason = header_fault(spec, pixel_limit);
-    if (!reason.empty()) return std::nullopt;
-    Texture texture;
-    texture.width = spec.width;
-    texture.height = spec.height;
-    texture.channels = spec.nchannels;
-    texture.name = file.filename().string();
-    const bool is_float = spec.format.is_floating_point();
-    TextureFiller filler(texture, is_float);
-    const bool ok = is_float ? read_rows<float>(*input, spec, OIIO::TypeDesc::FLOAT, filler)
-                             : read_rows<std::uint16_t>(*input, spec, OIIO::TypeDesc::UINT16, filler);
-    const std::string fault = input->geterror();
-    input->close();
-    if (!ok || !fault.empty()) {
-      reason = "the " + format + " picture is truncated or corrupt: " + one_line(fault);
-      return std::nullopt;
-    }
-    filler.finish();
-    return texture;
+    return decode(file, format, pixel_limit);
   } catch (const std::exception& error) {
-    reason = std::string("the picture can't be read: ") + one_line(error.what());
-    return std::nullopt;
+    return Failure{std::string("the picture cannot be read: ") + one_line(error.what())};
   }
 }
 
@@ -270,14 +256,14 @@ void save_png(const Picture& picture, const path& file) {
   if (wanted == 0 || (picture.channels != 1 && picture.channels != 3) || picture.pixels.size() != wanted)
     throw InputError(file.string(), "a picture of " + std::to_string(picture.width) + " x " +
                                         std::to_string(picture.height) + " x " + std::to_string(picture.channels) +
-                                        " with " + std::to_string(picture.pixels.size()) + " bytes can't be written");
+                                        " with " + std::to_string(picture.pixels.size()) + " bytes cannot be written");
   auto output = OIIO::ImageOutput::create("png");
   OIIO::ImageSpec spec(picture.width, picture.height, picture.channels, OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", "sRGB");
-  if (!output) throw InputError(file.string(), "can't be written: " + one_line(OIIO::geterror()));
+  if (!output) throw InputError(file.string(), "cannot be written: " + one_line(OIIO::geterror()));
   const bool ok = output->open(file.string(), spec) &&
                   output->write_image(OIIO::TypeDesc::UINT8, picture.pixels.data()) && output->close();
-  if (!ok) throw InputError(file.string(), "can't be written: " + one_line(output->geterror()));
+  if (!ok) throw InputError(file.string(), "cannot be written: " + one_line(output->geterror()));
 }
 
 }  // namespace hilbrush

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sampling/base/result.h"
 #include "sampling/model/textured_mesh.h"
 
 /// Model files in: VRML 2.0 (and the common part of 1.0) by our own reader in vrml/, OBJ+MTL, PLY, OFF and STL through
@@ -22,10 +23,8 @@ struct ModelLimits {
   std::size_t image_pixels = 64u << 20;  ///< all images of the model together
 };
 
-/// Reads one image file, or says why not (a sentence, in `reason`). load_image_file() of sampling_images is the real
-/// one.
-using ImageReader = std::function<std::optional<Texture>(const std::filesystem::path& file, std::size_t pixel_limit,
-                                                         std::string& reason)>;
+/// Reads one image file, or says why not. load_image_file() of sampling_images is the real one.
+using ImageReader = std::function<Result<Texture>(const std::filesystem::path& file, std::size_t pixel_limit)>;
 
 enum class UpAxis { kY, kZ };
 
@@ -37,8 +36,8 @@ struct Model {
   std::vector<std::filesystem::path> files;  ///< everything that was read: the model, inlines, material files, images
 };
 
-/// Reads `file`; other files are only read from its folder or below. Textures that can't be read are warnings, not
-/// errors.
+/// Reads `file`; other files are only read from its folder or below. Textures that cannot be read are warnings,
+/// not errors.
 /// @throws InputError with at() = "file:line" (or "file") if there is no usable geometry or a limit is exceeded.
 Model load_model(const std::filesystem::path& file, const ImageReader& read_image, const ModelLimits& limits = {});
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <utility>
 
 #include "sampling/base/input_error.h"
 
@@ -12,9 +13,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxUrl = 1024;
-constexpr std::size_t kSpellingLimit = 16;
-constexpr std::size_t kChunk = 1 << 18;
+constexpr std::size_t kMaxUrlBytes = 1024;
+constexpr std::size_t kSpellingLimit = 16;  ///< of one url
+constexpr std::size_t kChunkBytes = 1 << 18;
 
 int hex_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -71,16 +72,11 @@ bool ModelFolder::contains(const fs::path& canonical) const {
   return std::mismatch(folder_.begin(), folder_.end(), canonical.begin(), canonical.end()).first == folder_.end();
 }
 
-std::optional<fs::path> ModelFolder::find(const fs::path& base, const std::string& url, std::string& reason) const {
-  reason = "there is no such file";
-  if (url.empty() || url.size() > kMaxUrl || has_control_bytes(url) || has_control_bytes(percent_decoded(url))) {
-    reason = "that is no file name";
-    return std::nullopt;
-  }
-  if (url.find("://") != url.npos && url.rfind("file:", 0) != 0) {
-    reason = "only files beside the model are read";
-    return std::nullopt;
-  }
+Result<fs::path> ModelFolder::find(const fs::path& base, const std::string& url) const {
+  if (url.empty() || url.size() > kMaxUrlBytes || has_control_bytes(url) || has_control_bytes(percent_decoded(url)))
+    return Failure{"that is not a file name"};
+  if (url.find("://") != url.npos && url.rfind("file:", 0) != 0) return Failure{"only files beside the model are read"};
+  std::string reason = "there is no such file";
   for (const std::string& spelling : spellings(url)) {
     std::error_code error;
     const fs::path file = fs::canonical(base / spelling, error);
@@ -92,7 +88,7 @@ std::optional<fs::path> ModelFolder::find(const fs::path& base, const std::strin
     if (fs::is_regular_file(file, error)) return file;
     reason = "it is not a regular file";
   }
-  return std::nullopt;
+  return Failure{std::move(reason)};
 }
 
 std::string ModelFolder::read(const fs::path& file) {
@@ -101,13 +97,13 @@ std::string ModelFolder::read(const fs::path& file) {
     throw InputError(name(file),
                      error || !fs::exists(file, error) ? "there is no such file" : "it is not a regular file");
   const auto size = fs::file_size(file, error);
-  if (error) throw InputError(name(file), "its size can't be read");
+  if (error) throw InputError(name(file), "its size cannot be read");
   if (size > file_bytes_)
     throw InputError(name(file), "the file is larger than the limit of " + std::to_string(file_bytes_) + " bytes");
   std::ifstream in(file, std::ios::binary);
   std::string bytes(size, '\0');
   if (!in || (size > 0 && !in.read(bytes.data(), static_cast<std::streamsize>(size))))
-    throw InputError(name(file), "the file can't be read");
+    throw InputError(name(file), "the file cannot be read");
   note(file);
   if (bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b') return gunzip(bytes, file_bytes_, name(file));
   return bytes;
@@ -125,14 +121,15 @@ std::string ModelFolder::name(const fs::path& file) const {
 std::string gunzip(const std::string& bytes, std::size_t limit, const std::string& file) {
   z_stream stream{};
   // 15 + 16: the largest window, gzip framing only.
-  if (inflateInit2(&stream, 15 + 16) != Z_OK) throw InputError(file, "can't be gunzipped");
+  if (inflateInit2(&stream, 15 + 16) != Z_OK) throw InputError(file, "cannot be gunzipped");
   struct End {
     z_stream& stream;
     ~End() { inflateEnd(&stream); }
   } end{stream};
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
   stream.avail_in = static_cast<uInt>(bytes.size());
-  std::string out, chunk(kChunk, '\0');
+  std::string out;
+  std::string chunk(kChunkBytes, '\0');
   for (;;) {
     stream.next_out = reinterpret_cast<Bytef*>(chunk.data());
     stream.avail_out = static_cast<uInt>(chunk.size());

@@ -1,9 +1,10 @@
 #pragma once
 #include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
+
+#include "sampling/base/result.h"
 
 /// The one way by which a model's readers reach files: only below the folder of the model, whatever a file names or a
 /// link points to.
@@ -16,16 +17,15 @@ class ModelFolder {
   ModelFolder(const std::filesystem::path& model_file, std::size_t file_bytes);
 
   /// Finds the file that `url`, written in a file of folder `base`, means: as written, with \ for / and %20 for a
-  /// space, and (as exporters like to write paths of their own machine) by ever shorter ends of it. Null with the
-  /// reason if it is not there, not a regular file, or not below the model's folder.
-  std::optional<std::filesystem::path> find(const std::filesystem::path& base, const std::string& url,
-                                            std::string& reason) const;
+  /// space, and (as exporters like to write paths of their own machine) by ever shorter ends of it. A failure if it is
+  /// not there, not a regular file, or not below the model's folder.
+  Result<std::filesystem::path> find(const std::filesystem::path& base, const std::string& url) const;
 
-  /// The bytes of a file, gunzipped if they are gzip. @throws InputError naming the file if it can't be read or is too
-  /// large.
+  /// The bytes of a file, gunzipped if they are gzip. @throws InputError naming the file if it cannot be read or is
+  /// too large.
   std::string read(const std::filesystem::path& file);
 
-  /// Notes that `file` was read by someone else (an image).
+  /// Notes that `file` was read otherwise than by read() (an image).
   void note(const std::filesystem::path& file);
 
   const std::filesystem::path& path() const { return folder_; }

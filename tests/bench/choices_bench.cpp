@@ -8,13 +8,13 @@
 #include <exception>
 #include <numbers>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/gaps/fill_holes.h"
 #include "sampling/laminar/laminar.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
 #include "sampling/parametric/parametric.h"
+#include "sampling/place_dots.h"
 #include "tests/bench/answer_hash.h"
 #include "tests/bench/process_usage.h"
 
@@ -56,9 +56,7 @@ void time_sphere(std::uint64_t count, AnswerHash& hash) {
 }
 
 void time_model(const char* file, std::uint64_t count, AnswerHash& hash) {
-  const ImageReader no_images = [](const std::filesystem::path&, std::size_t, std::string&) {
-    return std::optional<Texture>();
-  };
+  const ImageReader no_images = [](const std::filesystem::path&, std::size_t) { return Failure{"not read here"}; };
   PlacementOptions placement;
   placement.size_m = .08;
   const TexturedMesh mesh = repair_mesh(place_on_table(load_model(file, no_images), placement)).mesh;

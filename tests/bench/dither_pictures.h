@@ -108,9 +108,8 @@ inline Original text() {
 
 /// From an image file: coverage = 1 - luminance.
 inline Original from_file(const std::string& file) {
-  std::string reason;
-  const auto loaded = load_image_file(file, std::size_t{1} << 26, reason);
-  if (!loaded) throw InputError(file, reason);
+  const auto loaded = load_image_file(file, std::size_t{1} << 26);
+  if (!loaded) throw InputError(file, loaded.reason());
   const Texture& texture = *loaded;
   Original picture{file.substr(file.find_last_of('/') + 1), texture.width, texture.height, {}};
   for (const float luminance : texture.luminance) picture.coverage.push_back(1 - luminance);

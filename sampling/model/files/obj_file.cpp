@@ -261,21 +261,20 @@ std::map<std::string, MtlMaterial> read_libraries(const PlainObj& plain, const s
                                                   std::vector<std::string>& warnings) {
   std::map<std::string, MtlMaterial> materials;
   for (const std::string& library : plain.libraries) {
-    std::string reason;
     // A name may hold spaces, or the line several names.
     std::vector<std::string> names{library};
-    if (!folder.find(folder.path(), library, reason)) {
+    if (!folder.find(folder.path(), library)) {
       names.clear();
       std::string_view rest = library;
       for (std::string_view word; !(word = take_word(rest)).empty() && names.size() < 16;) names.emplace_back(word);
     }
     for (const std::string& each : names) {
-      const auto file = folder.find(folder.path(), each, reason);
+      const auto file = folder.find(folder.path(), each);
       if (file)
         read_mtl(folder.read(*file), materials);
       else
-        warnings.push_back(name + ": the material file can't be read (" + reason + "); tried '" + each.substr(0, 120) +
-                           "'");
+        warnings.push_back(name + ": the material file cannot be read (" + file.reason() + "); tried '" +
+                           each.substr(0, 120) + "'");
     }
   }
   return materials;
@@ -303,15 +302,14 @@ std::vector<Look> looks_of(const PlainObj& plain, const std::string& name, Model
     if (material.texture.empty()) continue;
     const auto [texture, is_new] = textures.try_emplace(material.texture, -1);
     if (is_new) {
-      std::string reason;
-      const auto file = folder.find(folder.path(), material.texture, reason);
-      if (auto image = file ? read_image(*file, pixels_left, reason) : std::nullopt) {
+      const auto file = folder.find(folder.path(), material.texture);
+      if (auto image = file ? read_image(*file, pixels_left) : Failure{file.reason()}) {
         pixels_left -= image->luminance.size();
         image->name = folder.name(*file);
         texture->second = builder.add_texture(std::move(*image));
         folder.note(*file);
       } else if (warnings.size() < 100) {
-        warnings.push_back(name + ": the texture can't be read (" + reason + "); tried '" +
+        warnings.push_back(name + ": the texture cannot be read (" + image.reason() + "); tried '" +
                            material.texture.substr(0, 120) + "'");
       }
     }

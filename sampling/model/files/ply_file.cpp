@@ -283,16 +283,16 @@ Model load_ply(std::string text, const std::string& name, ModelFolder& folder, c
   MeshBuilder builder(limits);
   Look look;
   for (const std::string& texture : header.textures) {
-    std::string reason;
-    const auto file = folder.find(folder.path(), texture, reason);
-    if (auto image = file ? read_image(*file, limits.image_pixels, reason) : std::nullopt) {
+    const auto file = folder.find(folder.path(), texture);
+    auto image = file ? read_image(*file, limits.image_pixels) : Failure{file.reason()};
+    if (image) {
       image->name = folder.name(*file);
       look.texture = builder.add_texture(std::move(*image));
       folder.note(*file);
       break;
     }
-    model.warnings.push_back(name + ": the texture can't be read (" + reason + "); tried '" + texture.substr(0, 120) +
-                             "'");
+    model.warnings.push_back(name + ": the texture cannot be read (" + image.reason() + "); tried '" +
+                             texture.substr(0, 120) + "'");
   }
   if (look.texture >= 0 && header.textures.size() > 1)
     model.warnings.push_back(name + ": only one of the " + std::to_string(header.textures.size()) +

@@ -74,8 +74,11 @@ const Scene* Reading::open_inline(const Node& node, const std::vector<std::strin
   for (std::size_t i = 0; i < std::min(urls.size(), kUrlLimit) && lookup_count_ < kLookupLimit; ++i) {
     ++lookup_count_;
     // Links into a file are not followed: "arm.wrl#Viewpoint" is arm.wrl.
-    const auto file = folder_.find(folder_of(node), urls[i].substr(0, urls[i].find('#')), reason);
-    if (!file) continue;
+    const auto file = folder_.find(folder_of(node), urls[i].substr(0, urls[i].find('#')));
+    if (!file) {
+      reason = file.reason();
+      continue;
+    }
     const auto [found, is_first] = scenes_.try_emplace(file->string());
     if (is_first) {
       const std::string text = folder_.read(*file);
@@ -84,7 +87,7 @@ const Scene* Reading::open_inline(const Node& node, const std::vector<std::strin
     return known->second = found->second.get();
   }
   ++missing_inline_count_;
-  warn(node, "the inlined file can't be read (" + reason + "); tried " + quoted_list(urls));
+  warn(node, "the inlined file cannot be read (" + reason + "); tried " + quoted_list(urls));
   return nullptr;
 }
 
@@ -94,21 +97,27 @@ int Reading::open_image(const Node& node, const std::vector<std::string>& urls) 
   std::string reason = "it names no file";
   for (std::size_t i = 0; i < std::min(urls.size(), kUrlLimit) && lookup_count_ < kLookupLimit; ++i) {
     ++lookup_count_;
-    const auto file = folder_.find(folder_of(node), urls[i], reason);
-    if (!file) continue;
-    const auto [found, is_first] = images_.try_emplace(file->string(), -1);
-    if (is_first) {
-      if (auto texture = read_image_(*file, limits_.image_pixels - pixel_count_, reason)) {
-        pixel_count_ += texture->luminance.size();
-        texture->name = folder_.name(*file);
-        found->second = builder.add_texture(std::move(*texture));
-        folder_.note(*file);
-      }
+    const auto file = folder_.find(folder_of(node), urls[i]);
+    if (!file) {
+      reason = file.reason();
+      continue;
     }
-    if (found->second >= 0) return known->second = found->second;
+    const auto [found, is_first] = images_.try_emplace(file->string(), Failure{});
+    if (is_first) found->second = add_image(*file);
+    if (found->second) return known->second = *found->second;
+    reason = found->second.reason();
   }
-  warn(node, "the texture can't be read (" + reason + "); tried " + quoted_list(urls));
+  warn(node, "the texture cannot be read (" + reason + "); tried " + quoted_list(urls));
   return -1;
+}
+
+Result<int> Reading::add_image(const fs::path& file) {
+  auto texture = read_image_(file, limits_.image_pixels - pixel_count_);
+  if (!texture) return Failure{texture.reason()};
+  pixel_count_ += texture->luminance.size();
+  texture->name = folder_.name(file);
+  folder_.note(file);
+  return builder.add_texture(std::move(*texture));
 }
 
 int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
@@ -118,7 +127,7 @@ int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
   const double count = std::floor(image[0]) * std::floor(image[1]);
   if (image[2] < 1 || image[2] > 4 || count > static_cast<double>(image.size() - 3) ||
       count > static_cast<double>(limits_.image_pixels - pixel_count_)) {
-    warn(node, "the texture of pixels can't be read: it must have width, height, 1 to 4 channels, and as many pixels");
+    warn(node, "the texture of pixels cannot be read: it must have width, height, 1 to 4 channels, and as many pixels");
     return -1;
   }
   Texture texture;

@@ -61,6 +61,7 @@ class Reading {
 
  private:
   std::filesystem::path folder_of(const Node& node) const;
+  Result<int> add_image(const std::filesystem::path& file);
   std::string no_surface_sentence() const;
 
   struct Ignored {
@@ -74,8 +75,8 @@ class Reading {
   ParseBudget parse_budget_;
   std::size_t node_count_ = 0, work_ = 0, pixel_count_ = 0, missing_inline_count_ = 0, lookup_count_ = 0;
   std::deque<Frame> frames_;
-  std::map<std::string, std::unique_ptr<Scene>> scenes_;                         // by file; null: can't be read
-  std::map<std::string, int> images_;                                            // by file; -1: can't be read
+  std::map<std::string, std::unique_ptr<Scene>> scenes_;                         // by file
+  std::map<std::string, Result<int>> images_;                                    // by file: the texture's index
   std::map<std::pair<std::string, std::vector<std::string>>, int> image_lists_;  // by folder and urls
   std::map<std::pair<std::string, std::vector<std::string>>, const Scene*> inline_lists_;
   std::map<const double*, int> pixel_textures_;

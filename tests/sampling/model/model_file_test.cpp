@@ -58,7 +58,7 @@ TEST(ModelFile, NamesTheTexturesItTried) {
   const Model model = disk.load_vrml(
       "Shape { appearance Appearance { texture ImageTexture { url [ \"a.png\" \"../b.png\" ] } } geometry Box { } }");
   EXPECT_TRUE(
-      warns(model, "model.wrl:2: the texture can't be read (there is no such file); tried 'a.png', '../b.png'"));
+      warns(model, "model.wrl:2: the texture cannot be read (there is no such file); tried 'a.png', '../b.png'"));
   EXPECT_EQ(model.mesh.materials[0].texture, -1);
 }
 
@@ -81,9 +81,9 @@ TEST(ModelFile, SharesTexturesAndCountsTheirPixels) {
       "Shape { appearance Appearance { texture ImageTexture { url \"a.png\" } } geometry Box { } }\n";
   EXPECT_EQ(disk.load_vrml(shape + shape).mesh.textures.size(), 1u);
   std::vector<std::size_t> limits_seen;
-  const auto reader = [&](const fs::path&, std::size_t limit, std::string&) {
+  const auto reader = [&](const fs::path&, std::size_t limit) {
     limits_seen.push_back(limit);
-    return std::optional(Texture{2, 1, 3, {0, 1}, {}, ""});
+    return Texture{2, 1, 3, {0, 1}, {}, ""};
   };
   disk.write("b.png", "x");
   ModelLimits limits;

@@ -40,11 +40,8 @@ class ModelOnDisk {
   }
 
   /// Any existing file is a picture: 2 x 1 texels, dark and light; "gray" in its name makes it one channel.
-  static std::optional<Texture> fake_image(const std::filesystem::path& file, std::size_t, std::string& reason) {
-    if (!std::filesystem::exists(file)) {
-      reason = "there is no such file";
-      return std::nullopt;
-    }
+  static Result<Texture> fake_image(const std::filesystem::path& file, std::size_t) {
+    if (!std::filesystem::exists(file)) return Failure{"there is no such file"};
     Texture texture{2, 1, 3, {.25f, .75f}, {}, file.filename().string()};
     if (texture.name.find("gray") != std::string::npos) texture.channels = 1;
     return texture;

@@ -107,9 +107,8 @@ TEST_F(Pictures, ShowWantedPaintedAndErrorWhereTheyAre) {
   EXPECT_EQ(files[0], folder_ / "views" / "front.png");
   EXPECT_EQ(files[6], folder_ / "exposure.png");
 
-  std::string reason;
-  const auto front = load_image_file(files[0], 10'000'000, reason);
-  ASSERT_TRUE(front) << reason;
+  const auto front = load_image_file(files[0], 10'000'000);
+  ASSERT_TRUE(front) << front.reason();
   // Black in the left panel (wanted) only: nothing is painted. Row 0 of a Texture is the bottom.
   double x_mean = 0, y_mean = 0;
   int black = 0, black_elsewhere = 0;
