@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sampling/laminar/laminar.h"
+#include "sampling/place_dots.h"
 #include "sampling/tone/levels.h"
 
 namespace hilbrush {

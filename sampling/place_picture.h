@@ -3,7 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface_curve.h"
+#include "sampling/dots/path_meter.h"
 #include "sampling/fine/fine.h"
 #include "sampling/gaps/fill_holes.h"
 #include "sampling/predictive/predictive_loop.h"

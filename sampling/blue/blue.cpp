@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "sampling/base/check.h"
+#include "sampling/base/frame.h"
 #include "sampling/blue/coloring.h"
 #include "sampling/blue/kernel.h"
 #include "sampling/blue/stratum_places.h"
@@ -55,7 +56,7 @@ IndexLists find_neighbors(const SurfaceCurve& curve, const PlacedStrata& strata)
   balls.reserve(strata.strata.size());
   for (const PlacedStratum& stratum : strata.strata) balls.push_back({stratum.middle_O, reach_of(stratum)});
   tbb::enumerable_thread_specific<GrowingBall> growing_balls(
-      [&] { return GrowingBall(curve.mesh(), curve.implementation().neighbors); });
+      [&] { return GrowingBall(curve.mesh(), curve.surface().neighbors); });
   const auto first_place = [&](std::uint32_t i) -> const SurfacePlace& {
     return strata.place(i, static_cast<std::size_t>(std::countr_zero(strata.strata[i].open_places)));
   };
@@ -188,15 +189,15 @@ class Relaxation {
     offset *= std::min(1., kMaxStep * h / std::max(offset.norm(), 1e-300));
     Vector3d from_home = here_O + offset - home_O;
     from_home *= std::min(1., kMaxWay * h / std::max(from_home.norm(), 1e-300));
-    move_to(dots_[i], curve_, tone_, home_O + from_home);
+    move_to(dots_[i], curve_.surface(), tone_, home_O + from_home);
   }
 
   /// Places on the border beside each stratum, where walks outwards and to both sides from its open places end.
   void find_border() {
-    const SurfaceCurve::Implementation& curve = curve_.implementation();
+    const Surface& surface = curve_.surface();
     const auto has_border = [](const auto& sides) { return std::ranges::find(sides, kNoSide) != sides.end(); };
     border_.resize(dots_.size());
-    if (std::ranges::none_of(curve.neighbors, has_border)) return;
+    if (std::ranges::none_of(surface.neighbors, has_border)) return;
     tbb::parallel_for(std::size_t{0}, dots_.size(), [&](std::size_t i) {
       const PlacedStratum& stratum = strata_.strata[i];
       for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
@@ -205,10 +206,10 @@ class Relaxation {
         const Vector3d outwards = (place.position_O - stratum.middle_O).normalized();
         const Vector3d across = stratum.normal_O.cross(outwards);
         for (const Vector3d& way : {outwards, across, Vector3d(-across)}) {
-          const SurfacePoint end = walk_towards(curve.mesh, curve.neighbors, {place.triangle, {}},
-                                                place.position_O + kToBorder * stratum.spacing_m * way);
-          const bool is_on_border = has_border(curve.neighbors[end.triangle]) && end.barycentric.minCoeff() <= 0;
-          if (is_on_border) border_[i].push_back(position(curve.mesh, end));
+          const SurfacePoint end =
+              walk_towards(surface, {place.triangle, {}}, place.position_O + kToBorder * stratum.spacing_m * way);
+          const bool is_on_border = has_border(surface.neighbors[end.triangle]) && end.barycentric.minCoeff() <= 0;
+          if (is_on_border) border_[i].push_back(position(surface.mesh, end));
         }
       }
     });
@@ -234,7 +235,7 @@ class Relaxation {
     for (const Vector3d& place_O : border_[i]) look_at(place_O);
     if (worst > enough) {
       const Vector3d way = hole_O - here_O;
-      move_to(dots_[i], curve_, tone_, here_O + (1 - enough / way.norm()) * way);
+      move_to(dots_[i], curve_.surface(), tone_, here_O + (1 - enough / way.norm()) * way);
     }
   }
 
@@ -253,7 +254,7 @@ class Relaxation {
       worst = least - distance;
       away = worst / distance * way;
     }
-    if (worst > 0) move_to(dots_[i], curve_, tone_, here_O + away);
+    if (worst > 0) move_to(dots_[i], curve_.surface(), tone_, here_O + away);
   }
 
   template <class Visit>
@@ -280,30 +281,10 @@ std::vector<Dot> dots_at(const SurfaceCurve& curve, const ToneField& tone, const
   std::vector<Dot> dots(places.size());
   tbb::parallel_for(std::size_t{0}, dots.size(), [&](std::size_t i) {
     const SurfacePlace& place = places[i];
-    dots[i] = make_dot(curve.implementation(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
+    dots[i] = make_dot(curve.surface(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
                        place.component);
   });
   return dots;
-}
-
-/// Replaces the paths of the walk along the strata by those along the dots.
-void measure_paths(const std::vector<Dot>& dots, SampleReport& report) {
-  const auto constant = [](double length_m, std::uint64_t count, double area_m2) {
-    return count > 1 ? length_m / std::sqrt(static_cast<double>(count) * area_m2) : 0;
-  };
-  report.path_length_m = 0;
-  for (ComponentPath& path : report.components) path.dot_count = 0, path.path_length_m = 0;
-  for (std::size_t i = 0; i < dots.size(); ++i) {
-    ComponentPath& path = report.components.at(dots[i].component);
-    ++path.dot_count;
-    if (i == 0) continue;
-    const double length_m = (dots[i].position_O - dots[i - 1].position_O).norm();
-    report.path_length_m += length_m;
-    if (dots[i].component == dots[i - 1].component) path.path_length_m += length_m;
-  }
-  report.path_constant = constant(report.path_length_m, dots.size(), report.painted_area_m2);
-  for (ComponentPath& path : report.components)
-    path.path_constant = constant(path.path_length_m, path.dot_count, path.painted_area_m2);
 }
 
 }  // namespace
@@ -323,7 +304,10 @@ DotSequence place_blue(const SurfaceCurve& curve, const ToneField& tone, const S
     relaxation.refine(second_half);
     relaxation.even_out(second_half);
     sequence.dots = dots_at(curve, tone, relaxation.dots());
-    measure_paths(sequence.dots, figures);
+    // In place of the path that the walk along the strata has measured.
+    PathMeter meter(figures);
+    meter.follow(sequence.dots);
+    meter.finish();
   }
   if (report) *report = figures;
   return sequence;

@@ -1,5 +1,8 @@
 #pragma once
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface_curve.h"
+#include "sampling/dots/dots.h"
+#include "sampling/dots/path_meter.h"
+#include "sampling/tone/tone_field.h"
 
 /// `blue`: dots as far from each other as their strata allow, in no direction more than in another.
 namespace hilbrush {

@@ -2,8 +2,9 @@
 #include <vector>
 
 #include "sampling/curve/chart.h"
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface_curve.h"
 #include "sampling/disk/components.h"
+#include "sampling/model/edges.h"
 
 /// From components to charts: each is flattened, the pieces are chained, and their base trees are built.
 namespace hilbrush {

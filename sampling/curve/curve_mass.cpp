@@ -23,18 +23,22 @@ double density_on_square(const Chart& chart, const TriangleTone& tone, const Cha
   return tone.space() * std::abs(cross(b[1] - b[0], b[2] - b[0]) / cross(p[1] - p[0], p[2] - p[0]));
 }
 
+}  // namespace
+
 template <class Curve>
-void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass* pieces, double& painted_area_m2) {
+void CurveMass::measure(QuadMass& result, double& painted_area_m2) {
   constexpr int kDimensions = kDimensionsOf<Curve>;
-  const Chart& chart = mass.chart_of(result);
-  const BaseQuad& quad = mass.base_quad(result);
-  double total = 0, squares = 0;
+  const Chart& chart = chart_of(result);
+  const BaseQuad& quad = base_quad(result);
+  PieceMass* pieces = pieces_.data() + result.first_piece;
+  double total = 0;
+  double squares = 0;
   for (std::uint32_t i = 0; i < quad.face_count; ++i) {
     const ChartFace& face = chart.face_of(quad, i);
     pieces[i].triangle = face.triangle;
-    const TriangleTone tone = mass.tone.on(face.triangle);
+    const TriangleTone tone = tone_.on(face.triangle);
     if (tone.is_blank()) continue;
-    auto piece = whole_piece<kDimensions>(chart, mass.curve.mesh, face);
+    auto piece = whole_piece<kDimensions>(chart, mesh(), face);
     clip_to_box<kDimensions>(piece, quad.low.template head<kDimensions>(), quad.size);
     const ToneIntegral integral = integrate(tone, piece);
     if (!(integral.mass > 0)) continue;
@@ -42,8 +46,7 @@ void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass*
     pieces[i] = {integral.mass, static_cast<float>(integral.square), face.triangle, center.cast<float>()};
     total += integral.mass;
     painted_area_m2 += integral.area_m2;
-    result.moment_O +=
-        integral.mass * position(mass.curve.mesh, {face.triangle, {1 - center.sum(), center.x(), center.y()}});
+    result.moment_O += integral.mass * position(mesh(), {face.triangle, {1 - center.sum(), center.x(), center.y()}});
     if constexpr (kDimensions == 2) squares += integral.square * density_on_square(chart, tone, face);
   }
   if constexpr (kDimensions == 2)
@@ -51,23 +54,14 @@ void measure(const CurveMass::Implementation& mass, QuadMass& result, PieceMass*
       result.misplaced = static_cast<float>(std::sqrt(std::max(0., squares * quad.size * quad.size - total * total)));
 }
 
-}  // namespace
-
-std::size_t CurveMass::Implementation::quad_at(double at) const {
-  const auto above = std::upper_bound(mass_before.begin() + 1, mass_before.end() - 1, at);
-  return static_cast<std::size_t>(above - mass_before.begin()) - 1;
-}
-
-CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
-    : implementation_(std::make_unique<Implementation>(curve.implementation(), tone)) {
-  CHECK(&curve.mesh() == &tone.mesh());
-  Implementation& mass = *implementation_;
+void CurveMass::list_quads() {
+  const std::vector<Chart>& charts = curve_.charts();
   std::size_t piece_count = 0;
-  for (std::uint32_t s = 0; s < mass.curve.charts.size(); ++s)
-    for (std::uint32_t q = 0; q < mass.curve.charts[s].base_quads.size(); ++q) {
-      const BaseQuad& base = mass.curve.charts[s].base_quads[q];
-      QuadMass& quad = mass.quads.emplace_back();
-      quad.chart = s;
+  for (std::uint32_t c = 0; c < charts.size(); ++c)
+    for (std::uint32_t q = 0; q < charts[c].base_quads.size(); ++q) {
+      const BaseQuad& base = charts[c].base_quads[q];
+      QuadMass& quad = quads_.emplace_back();
+      quad.chart = c;
       quad.quad = q;
       quad.first_piece = static_cast<std::uint32_t>(piece_count);
       quad.piece_count = base.face_count;
@@ -75,32 +69,30 @@ CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone)
       piece_count += base.face_count;
     }
   CHECK_LE(piece_count, std::numeric_limits<std::uint32_t>::max());
-  mass.pieces.resize(piece_count);
-  std::vector<double> painted_area_m2(mass.quads.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mass.quads.size(), kGrain), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      QuadMass& quad = mass.quads[i];
-      PieceMass* pieces = mass.pieces.data() + quad.first_piece;
-      with_curve(mass.chart_of(quad).kind,
-                 [&]<class Curve>(Curve) { measure<Curve>(mass, quad, pieces, painted_area_m2[i]); });
-    }
+  pieces_.resize(piece_count);
+}
+
+CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone) : curve_(curve), tone_(tone) {
+  CHECK(&curve.mesh() == &tone.mesh());
+  list_quads();
+  std::vector<double> painted_area_m2(quads_.size(), 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quads_.size(), kGrain), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      with_curve(chart_of(quads_[i]).kind, [&]<class Curve>(Curve) { measure<Curve>(quads_[i], painted_area_m2[i]); });
   });
-  mass.painted_area_m2.assign(mass.curve.charts.size(), 0);
-  mass.mass_before.assign(mass.quads.size() + 1, 0);
-  for (std::size_t i = 0; i < mass.quads.size(); ++i) {
-    const QuadMass& quad = mass.quads[i];
+  painted_area_m2_.assign(curve_.charts().size(), 0);
+  mass_before_.assign(quads_.size() + 1, 0);
+  for (std::size_t i = 0; i < quads_.size(); ++i) {
     double sum = 0;
-    for (const PieceMass& piece : mass.pieces_of(quad)) sum += piece.mass;
-    mass.painted_area_m2[quad.chart] += painted_area_m2[i];
-    mass.mass_before[i + 1] = mass.mass_before[i] + sum;
+    for (const PieceMass& piece : pieces_of(quads_[i])) sum += piece.mass;
+    painted_area_m2_[quads_[i].chart] += painted_area_m2[i];
+    mass_before_[i + 1] = mass_before_[i] + sum;
   }
 }
 
-CurveMass::~CurveMass() = default;
-CurveMass::CurveMass(CurveMass&&) noexcept = default;
-
-double CurveMass::total_m2() const {
-  return implementation_->total();
+std::size_t CurveMass::quad_at(double at) const {
+  const auto above = std::upper_bound(mass_before_.begin() + 1, mass_before_.end() - 1, at);
+  return static_cast<std::size_t>(above - mass_before_.begin()) - 1;
 }
 
 }  // namespace hilbrush

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "sampling/base/check.h"
+#include "sampling/curve/chart.h"
 #include "sampling/curve/project_to_surface.h"
 #include "sampling/curve/stratum.h"
 
@@ -97,7 +98,7 @@ class DotWriter {
  protected:
   /// `asked`: the tone there, if it is known.
   void put_at(const SurfacePoint& point, std::uint32_t chart, std::optional<double> asked = {}) {
-    const std::uint32_t component = plan_.mass.curve.charts[chart].component;
+    const std::uint32_t component = plan_.mass.curve().charts()[chart].component;
     dots_.push_back(triangles_[point.triangle].dot_at(point.barycentric, component, asked));
   }
 
@@ -116,16 +117,16 @@ class CenterWriter : public DotWriter {
 
   /// Whole base quads, `first` to `last` - 1.
   void add_quads(std::size_t first, std::size_t last) {
-    const CurveMass::Implementation& mass = plan_.mass;
+    const CurveMass& mass = plan_.mass;
     for (std::size_t begin = first; begin < last;) {
-      const std::uint32_t chart = mass.quads[begin].chart;
+      const std::uint32_t chart = mass.quads()[begin].chart;
       StratumPart& part = stratum_.on(chart);
       double sum = 0, heaviest = 0;
       std::size_t heaviest_quad = begin, q = begin;
-      for (; q < last && mass.quads[q].chart == chart; ++q) {
+      for (; q < last && mass.quads()[q].chart == chart; ++q) {
         const double quad_mass = mass.mass_of(q);
         sum += quad_mass;
-        part.moment_O += mass.quads[q].moment_O;
+        part.moment_O += mass.quads()[q].moment_O;
         if (quad_mass > heaviest) heaviest = quad_mass, heaviest_quad = q;
       }
       if (sum > 0) {
@@ -147,9 +148,9 @@ class CenterWriter : public DotWriter {
   void add_quad(std::size_t quad, double from, double to) {
     const double mass = (to - from) * plan_.mass.mass_of(quad);
     last_quad_ = quad;
-    StratumPart& part = stratum_.on(plan_.mass.quads[quad].chart);
+    StratumPart& part = stratum_.on(plan_.mass.quads()[quad].chart);
     part.mass += mass;
-    part.moment_O += (to - from) * plan_.mass.quads[quad].moment_O;
+    part.moment_O += (to - from) * plan_.mass.quads()[quad].moment_O;
     part.triangle = kNoTriangle;
     if (mass <= part.heaviest_mass) return;
     part.heaviest_mass = mass;
@@ -308,7 +309,7 @@ class PlaceWriter : public DotWriter {
     put_at(point_in(walk, node, share), walk.chart());
   }
   /// At the end of the curve, beyond what rounding has left of its last quad.
-  void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads[quad].chart); }
+  void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads()[quad].chart); }
 
  private:
   /// Within a patch the mass is taken as even on what is painted of it: where the curve is on blank surface, or beside
@@ -332,21 +333,22 @@ class PlaceWriter : public DotWriter {
     if (triangles_[triangle].asked(center.barycentric) > 0) return center;
     std::vector<Vector2d> polygon;
     for (const auto& corner : heaviest.piece.all()) polygon.push_back(corner.b);
-    return point_with_tone(plan_.mass.tone, triangle, polygon);
+    return point_with_tone(plan_.mass.tone(), triangle, polygon);
   }
 };
 
 }  // namespace
 
-DotPlan::DotPlan(const CurveMass::Implementation& m, const SampleOptions& options, std::uint64_t count)
+DotPlan::DotPlan(const CurveMass& m, const SampleOptions& options, std::uint64_t count)
     : mass(m),
-      strata{m.total(), count},
-      rule{m.total() / static_cast<double>(count), options.omega, options.uniform_depth.value_or(-1)} {
+      strata{m.total_m2(), count},
+      rule{m.total_m2() / static_cast<double>(count), options.omega, options.uniform_depth.value_or(-1)} {
   if (options.sampler != Sampler::kCentroid && options.sampler != Sampler::kFine)
     sequence.emplace(options.sampler, count, options.seed);
 }
 
-BlockMaker::BlockMaker(const DotPlan& plan) : plan_(plan), walks_(plan), triangles_(plan.mass.curve, plan.mass.tone) {}
+BlockMaker::BlockMaker(const DotPlan& plan)
+    : plan_(plan), walks_(plan), triangles_(plan.mass.curve().surface(), plan.mass.tone()) {}
 
 void BlockMaker::make(std::uint64_t first, std::uint64_t last, DotBlock& block) {
   block.dots.clear();

@@ -2,10 +2,10 @@
 
 namespace hilbrush {
 
-DotTriangle::DotTriangle(const SurfaceCurve::Implementation& curve, const ToneField& tone, std::uint32_t triangle)
+DotTriangle::DotTriangle(const Surface& surface, const ToneField& tone, std::uint32_t triangle)
     : triangle_(triangle),
-      corners_O_{curve.mesh.corner(triangle, 0), curve.mesh.corner(triangle, 1), curve.mesh.corner(triangle, 2)},
-      surface_(curve.dot_surfaces[triangle]),
+      corners_O_{surface.mesh.corner(triangle, 0), surface.mesh.corner(triangle, 1), surface.mesh.corner(triangle, 2)},
+      surface_(surface.dot_surfaces[triangle]),
       tone_(tone.on(triangle)) {}
 
 Dot DotTriangle::dot_at(const Eigen::Vector3d& place, std::uint32_t component, std::optional<double> asked) const {
@@ -31,9 +31,8 @@ Dot DotTriangle::dot_at(const Eigen::Vector3d& place, std::uint32_t component, s
   return dot;
 }
 
-Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& point,
-             std::uint32_t component) {
-  return DotTriangle(curve, tone, point.triangle).dot_at(point.barycentric, component);
+Dot make_dot(const Surface& surface, const ToneField& tone, const SurfacePoint& point, std::uint32_t component) {
+  return DotTriangle(surface, tone, point.triangle).dot_at(point.barycentric, component);
 }
 
 }  // namespace hilbrush

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "sampling/curve/surface_curve.h"
+#include "sampling/curve/surface.h"
+#include "sampling/dots/dots.h"
+#include "sampling/tone/tone_field.h"
 
 /// Dots at places of triangles.
 namespace hilbrush {
@@ -12,7 +14,7 @@ namespace hilbrush {
 class DotTriangle {
  public:
   DotTriangle() = default;
-  DotTriangle(const SurfaceCurve::Implementation& curve, const ToneField& tone, std::uint32_t triangle);
+  DotTriangle(const Surface& surface, const ToneField& tone, std::uint32_t triangle);
 
   std::uint32_t triangle() const { return triangle_; }
   /// The asked tone.
@@ -31,23 +33,22 @@ class DotTriangle {
 /// Keeps the triangles met last. What it returns depends on its argument alone.
 class DotTriangles {
  public:
-  DotTriangles(const SurfaceCurve::Implementation& curve, const ToneField& tone) : curve_(curve), tone_(tone) {}
+  DotTriangles(const Surface& surface, const ToneField& tone) : surface_(surface), tone_(tone) {}
 
   /// Valid until the next call.
   const DotTriangle& operator[](std::uint32_t triangle) {
     DotTriangle& slot = slots_[triangle % slots_.size()];
-    if (slot.triangle() != triangle) slot = DotTriangle(curve_, tone_, triangle);
+    if (slot.triangle() != triangle) slot = DotTriangle(surface_, tone_, triangle);
     return slot;
   }
 
  private:
-  const SurfaceCurve::Implementation& curve_;
+  const Surface& surface_;
   const ToneField& tone_;
   std::array<DotTriangle, 128> slots_;
 };
 
 /// The dot at a surface point, moved a hair inside its triangle.
-Dot make_dot(const SurfaceCurve::Implementation& curve, const ToneField& tone, const SurfacePoint& point,
-             std::uint32_t component);
+Dot make_dot(const Surface& surface, const ToneField& tone, const SurfacePoint& point, std::uint32_t component);
 
 }  // namespace hilbrush

@@ -1,38 +1,40 @@
 #include "sampling/curve/patches.h"
 
+#include "sampling/curve/stream_dots.h"
+
 namespace hilbrush {
 namespace {
 
 template <class Curve>
-void add_base_pieces(const CurveMass::Implementation& mass, std::size_t quad_index, Patch& patch) {
+void add_base_pieces(const CurveMass& mass, std::size_t quad_index, Patch& patch) {
   constexpr int kDimensions = kDimensionsOf<Curve>;
-  const QuadMass& quad = mass.quads[quad_index];
+  const QuadMass& quad = mass.quads()[quad_index];
   const BaseQuad& base = mass.base_quad(quad);
   for (std::uint32_t i = 0; i < base.face_count; ++i) {
     if (!(mass.pieces_of(quad)[i].mass > 0)) continue;
     const ChartFace& face = mass.chart_of(quad).face_of(base, i);
-    auto cut = whole_piece<kDimensions>(mass.chart_of(quad), mass.curve.mesh, face);
+    auto cut = whole_piece<kDimensions>(mass.chart_of(quad), mass.mesh(), face);
     clip_to_box<kDimensions>(cut, base.low.template head<kDimensions>(), base.size);
-    PatchPiece piece{face.triangle, {}, integrate(mass.tone.on(face.triangle), cut)};
+    PatchPiece piece{face.triangle, {}, integrate(mass.tone().on(face.triangle), cut)};
     for (const auto& corner : cut.all()) piece.corners_b.push_back(corner.b);
     patch.pieces.push_back(std::move(piece));
   }
 }
 
-Patch patch_of_quad(const CurveMass::Implementation& mass, std::size_t index) {
+Patch patch_of_quad(const CurveMass& mass, std::size_t index) {
   Patch patch;
-  patch.chart = mass.quads[index].chart;
-  patch.depth = mass.base_quad(mass.quads[index]).depth;
-  patch.at = mass.mass_before[index];
+  patch.chart = mass.quads()[index].chart;
+  patch.depth = mass.base_quad(mass.quads()[index]).depth;
+  patch.at = mass.mass_before(index);
   patch.mass = mass.mass_of(index);
-  with_curve(mass.chart_of(mass.quads[index]).kind,
+  with_curve(mass.chart_of(mass.quads()[index]).kind,
              [&]<class Curve>(Curve) { add_base_pieces<Curve>(mass, index, patch); });
   return patch;
 }
 
 template <class Curve>
-Patch patch_of(const CurveMass::Implementation& mass, const QuadWalk<Curve>& walk,
-               const typename QuadWalk<Curve>::Node& node, PatchKind kind) {
+Patch patch_of(const CurveMass& mass, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
+               PatchKind kind) {
   if (node.pieces.empty()) {
     Patch patch = patch_of_quad(mass, walk.quad());
     patch.kind = kind;
@@ -51,7 +53,7 @@ Patch patch_of(const CurveMass::Implementation& mass, const QuadWalk<Curve>& wal
 }
 
 struct AllPatches {
-  const CurveMass::Implementation& mass;
+  const CurveMass& mass;
   const std::function<void(const Patch&)>& visit;
 
   bool wants(double, double) const { return true; }
@@ -62,7 +64,7 @@ struct AllPatches {
 };
 
 struct Stretches {
-  const CurveMass::Implementation& mass;
+  const CurveMass& mass;
   const std::function<void(std::uint64_t, const Patch&, double, double)>& visit;
   std::uint64_t stratum = 0;
 
@@ -87,18 +89,16 @@ struct Stretches {
 
 }  // namespace
 
-void visit_patches(const CurveMass& curve_mass, const PatchRule& rule, const std::function<void(const Patch&)>& visit) {
-  const CurveMass::Implementation& mass = curve_mass.implementation();
+void visit_patches(const CurveMass& mass, const PatchRule& rule, const std::function<void(const Patch&)>& visit) {
   const AllPatches sink{mass, visit};
-  for (std::size_t q = 0; q < mass.quads.size(); ++q)
-    with_curve(mass.chart_of(mass.quads[q]).kind,
+  for (std::size_t q = 0; q < mass.quads().size(); ++q)
+    with_curve(mass.chart_of(mass.quads()[q]).kind,
                [&]<class Curve>(Curve) { QuadWalk<Curve>(mass, rule).walk(q, sink); });
 }
 
-void visit_stretches(const CurveMass& curve_mass, const SampleOptions& options,
+void visit_stretches(const CurveMass& mass, const SampleOptions& options,
                      const std::function<void(std::uint64_t, const Patch&, double, double)>& visit) {
-  const CurveMass::Implementation& mass = curve_mass.implementation();
-  const DotPlan plan(mass, options, count_dots(curve_mass, options));
+  const DotPlan plan(mass, options, count_dots(mass, options));
   Stretches stretches{mass, visit};
   std::vector<std::size_t> patches_at_depth;
   Walks walks(plan);

@@ -23,17 +23,16 @@ NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t t, cons
   return nearest;
 }
 
-SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbors& neighbors, const SurfacePoint& start,
-                          const Vector3d& target) {
-  NearestPoint here = nearest_in_triangle(mesh, start.triangle, target);
+SurfacePoint walk_towards(const Surface& surface, const SurfacePoint& start, const Vector3d& target) {
+  NearestPoint here = nearest_in_triangle(surface.mesh, start.triangle, target);
   for (int step = 0; step < kMaxWalk; ++step) {
     NearestPoint best = here;
     for (int side = 0; side < 3; ++side) {
       // Only across a side on which the nearest point lies: the one opposite a corner without weight.
       if (here.point.barycentric[(side + 2) % 3] > 0) continue;
-      const TriangleSide across = neighbors[here.point.triangle][static_cast<std::size_t>(side)];
+      const TriangleSide across = surface.neighbors[here.point.triangle][static_cast<std::size_t>(side)];
       if (across == kNoSide) continue;
-      const NearestPoint there = nearest_in_triangle(mesh, across.triangle, target);
+      const NearestPoint there = nearest_in_triangle(surface.mesh, across.triangle, target);
       if (there.distance2 < best.distance2 * (1 - 1e-12)) best = there;
     }
     if (best.point.triangle == here.point.triangle) break;

@@ -1,14 +1,14 @@
 #pragma once
 #include <span>
 
-#include "sampling/curve/surface_curve.h"
+#include "sampling/curve/surface.h"
+#include "sampling/tone/tone_field.h"
 
-/// Places on the surface.
+/// From positions in space to points on the surface.
 namespace hilbrush {
 
 /// The surface point nearest to `target_O` near `start`: a short walk from triangle to triangle.
-SurfacePoint walk_towards(const TexturedMesh& mesh, const Neighbors& neighbors, const SurfacePoint& start,
-                          const Eigen::Vector3d& target_O);
+SurfacePoint walk_towards(const Surface& surface, const SurfacePoint& start, const Eigen::Vector3d& target_O);
 
 /// The point of a triangle that is nearest to `target_O`, and how far that is, squared.
 struct NearestPoint {

@@ -22,7 +22,7 @@ void QuadWalk<Curve>::push_pieces(const QuadMass& quad, const BaseQuad& base, No
     roots_.push_back(static_cast<std::uint32_t>(held_count_));
     Held& held = push();
     held.frame = i;
-    held.piece = whole_piece<kDimensions>(chart, mass_.curve.mesh, chart.face_of(base, i));
+    held.piece = whole_piece<kDimensions>(chart, mass_.mesh(), chart.face_of(base, i));
     clip_to_box<kDimensions>(held.piece, node.low, node.size);
     held.integral = pieces[i].integral(held.piece.area_b() * frame(i).space);
   }

@@ -65,12 +65,11 @@ class QuadWalk {
     ToneIntegral integral;
   };
 
-  QuadWalk(const CurveMass::Implementation& mass, const PatchRule& rule)
-      : mass_(mass), rule_(rule), store_(mass.tone) {}
+  QuadWalk(const CurveMass& mass, const PatchRule& rule) : mass_(mass), rule_(rule), store_(mass.tone()) {}
 
   template <class Sink>
   void walk(std::size_t quad_index, Sink& sink) {
-    const QuadMass& quad = mass_.quads[quad_index];
+    const QuadMass& quad = mass_.quads()[quad_index];
     const BaseQuad& base = mass_.base_quad(quad);
     chart_index_ = quad.chart;
     quad_index_ = quad_index;
@@ -79,7 +78,7 @@ class QuadWalk {
     node.size = base.size;
     node.curve = curve_of<Curve>(base);
     node.depth = base.depth;
-    node.at = mass_.mass_before[quad_index];
+    node.at = mass_.mass_before(quad_index);
     node.mass = mass_.mass_of(quad_index);
     if (!(node.mass > 0)) return;
     store_.fetch(mass_.chart_of(quad), base, frames_);
@@ -182,7 +181,7 @@ class QuadWalk {
     std::vector<std::vector<std::uint32_t>> children{Curve::kChildCount};
   };
 
-  const CurveMass::Implementation& mass_;
+  const CurveMass& mass_;
   PatchRule rule_;
   std::uint32_t chart_index_ = 0;
   std::size_t quad_index_ = 0;

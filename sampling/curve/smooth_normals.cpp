@@ -1,12 +1,12 @@
+#include "sampling/curve/smooth_normals.h"
+
 #include <cmath>
 #include <numbers>
-
-#include "sampling/curve/surface_curve.h"
 
 namespace hilbrush {
 namespace {
 
-/// Edges that turn by more are edges of the object, not of its triangulation.
+/// Radians. Edges that turn by more are edges of the object, not of its triangulation.
 constexpr double kSharpEdge = 40 * std::numbers::pi / 180;
 
 class CornerNormals {
@@ -23,7 +23,7 @@ class CornerNormals {
   std::vector<std::array<Eigen::Vector3f, 3>> take() { return std::move(normals_); }
 
  private:
-  /// A side stands for the corner that it leaves.
+  /// A side stands for the corner where it begins.
   TriangleSide smooth_step(TriangleSide across, std::uint32_t from) const {
     if (across == kNoSide) return kNoSide;
     const double cosine = face_normals_[from].dot(face_normals_[across.triangle]);
@@ -53,7 +53,7 @@ class CornerNormals {
       at = counter_clockwise(at);
     } while (at != kNoSide && at != first);
     for (const TriangleSide member : around) {
-      // Around a vertex like the tip of a screw the mean may vanish: then the triangle's own normal has to do.
+      // Around a vertex like the tip of a screw the mean may vanish: then the triangle's own normal is taken.
       const bool is_usable = sum.dot(face_normals_[member.triangle]) > 1e-3 * sum.norm() && sum.norm() > 1e-9;
       normals_[member.triangle][member.side] =
           (is_usable ? sum.normalized() : face_normals_[member.triangle]).cast<float>();

@@ -27,9 +27,9 @@ struct Strata {
 
 /// What dots are to be placed: the same for all blocks.
 struct DotPlan {
-  DotPlan(const CurveMass::Implementation& mass, const SampleOptions& options, std::uint64_t count);
+  DotPlan(const CurveMass& mass, const SampleOptions& options, std::uint64_t count);
 
-  const CurveMass::Implementation& mass;
+  const CurveMass& mass;
   Strata strata;
   PatchRule rule;
   std::optional<Sequence> sequence;  ///< where along the curve; nothing: at the centers of strata
@@ -204,7 +204,7 @@ class Walks {
 
   template <class Sink>
   void walk(std::size_t quad, Sink& sink) {
-    with_curve(plan_.mass.chart_of(plan_.mass.quads[quad]).kind, [&]<class Curve>(Curve) {
+    with_curve(plan_.mass.chart_of(plan_.mass.quads()[quad]).kind, [&]<class Curve>(Curve) {
       auto& walk = std::get<std::optional<QuadWalk<Curve>>>(walks_);
       if (!walk) walk.emplace(plan_.mass, plan_.rule);
       walk->walk(quad, sink);
@@ -227,26 +227,26 @@ inline constexpr double kLightShare = .5;
 template <class Consumer>
 void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,
                 std::vector<std::size_t>& patches_at_depth) {
-  const CurveMass::Implementation& mass = plan.mass;
+  const CurveMass& mass = plan.mass;
   StrataCutter cutter(plan.strata, first, last, consumer);
   CountingSink sink(cutter, patches_at_depth);
-  const std::size_t end = mass.quads.size();
+  const std::size_t end = mass.quads().size();
   for (std::size_t q = mass.quad_at(plan.strata.begin_of(first)); q < end && !cutter.is_done();) {
     const auto is_walked = [&] {
-      return plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before[q], mass.mass_before[q + 1]);
+      return plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before(q), mass.mass_before(q + 1));
     };
     const std::size_t run = q;
     while (q < end && !is_walked()) ++q;
     if (q > run && !cutter.is_skipped()) {
       consumer.add_quads(run, q);
       for (std::size_t i = run; i < q; ++i)
-        if (mass.mass_of(i) > 0) sink.count(mass.quads[i].depth);
+        if (mass.mass_of(i) > 0) sink.count(mass.quads()[i].depth);
     }
     if (q == end) break;
     const double quad_mass = mass.mass_of(q);
     if (plan.rule.uniform_depth < 0 && quad_mass <= kLightShare * plan.rule.small_mass()) {
-      cutter.take_quad(q, mass.mass_before[q], quad_mass);
-      sink.count(mass.quads[q].depth);
+      cutter.take_quad(q, mass.mass_before(q), quad_mass);
+      sink.count(mass.quads()[q].depth);
     } else if (quad_mass > 0) {
       walks.walk(q, sink);
     }
@@ -261,15 +261,15 @@ void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uin
 template <class Consumer>
 void find_places(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,
                  std::vector<std::size_t>& patches_at_depth) {
-  const CurveMass::Implementation& mass = plan.mass;
-  PlaceFinder finder(*plan.sequence, mass.total(), first, last, consumer);
+  const CurveMass& mass = plan.mass;
+  PlaceFinder finder(*plan.sequence, mass.total_m2(), first, last, consumer);
   CountingSink sink(finder, patches_at_depth);
   std::size_t last_quad = 0;
-  for (std::size_t q = mass.quad_at(mass.total() * plan.sequence->at(first)); q < mass.quads.size(); ++q) {
+  for (std::size_t q = mass.quad_at(mass.total_m2() * plan.sequence->at(first)); q < mass.quads().size(); ++q) {
     if (finder.is_done()) return;
     if (!(mass.mass_of(q) > 0)) continue;
     last_quad = q;
-    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before[q], mass.mass_before[q + 1])) walks.walk(q, sink);
+    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before(q), mass.mass_before(q + 1))) walks.walk(q, sink);
   }
   for (std::uint64_t i = finder.index(); i < last; ++i) consumer.put_in_quad(last_quad);
 }

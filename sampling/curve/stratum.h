@@ -77,9 +77,9 @@ struct PaintedPoint {
 };
 
 /// The stratum's center of mass, put back on the surface; where that is blank, a painted point of its heaviest bit.
-PaintedPoint center_on_surface(const CurveMass::Implementation& mass, DotTriangles& triangles, const StratumPart& part);
+PaintedPoint center_on_surface(const CurveMass& mass, DotTriangles& triangles, const StratumPart& part);
 
 /// A painted point of a base quad that has mass, in the triangle that has most.
-SurfacePoint heaviest_point(const CurveMass::Implementation& mass, std::size_t quad);
+SurfacePoint heaviest_point(const CurveMass& mass, std::size_t quad);
 
 }  // namespace hilbrush

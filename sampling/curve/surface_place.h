@@ -1,13 +1,15 @@
 #pragma once
 #include "sampling/curve/project_to_surface.h"
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface.h"
+#include "sampling/tone/tone_field.h"
 
-/// A dot's place while it moves: on the surface, always.
+/// Where a dot is while it moves: always on the surface.
 namespace hilbrush {
 
 struct SurfacePlace {
   Eigen::Vector3d position_O = Eigen::Vector3d::Zero();
-  std::uint32_t triangle = 0, component = 0;
+  std::uint32_t triangle = 0;
+  std::uint32_t component = 0;
 };
 
 /// The surface point of a triangle at a position in its plane.
@@ -21,25 +23,13 @@ inline SurfacePoint surface_point_at(const TexturedMesh& mesh, std::uint32_t tri
 }
 
 /// Moves `place` to the surface nearest to `target_O`, unless that is blank: then it stays. Returns whether it moved.
-inline bool move_to(SurfacePlace& place, const SurfaceCurve& curve, const ToneField& tone,
+inline bool move_to(SurfacePlace& place, const Surface& surface, const ToneField& tone,
                     const Eigen::Vector3d& target_O) {
-  const SurfacePoint start{place.triangle, {}};
-  const SurfacePoint point = walk_towards(curve.mesh(), curve.implementation().neighbors, start, target_O);
+  const SurfacePoint point = walk_towards(surface, {place.triangle, {}}, target_O);
   if (!(tone.asked(point) > 0)) return false;
-  place.position_O = position(curve.mesh(), point);
+  place.position_O = position(surface.mesh, point);
   place.triangle = point.triangle;
   return true;
-}
-
-/// Two directions that make a right-handed frame with the unit vector z (Duff et al., "Building an Orthonormal Basis,
-/// Revisited", 2017).
-inline Eigen::Matrix3d frame_about(const Eigen::Vector3d& z) {
-  const double sign = std::copysign(1., z.z()), a = -1 / (sign + z.z()), b = z.x() * z.y() * a;
-  Eigen::Matrix3d frame;
-  frame.col(0) << 1 + sign * z.x() * z.x() * a, sign * b, -sign * z.x();
-  frame.col(1) << b, sign + z.y() * z.y() * a, -z.y();
-  frame.col(2) = z;
-  return frame;
 }
 
 }  // namespace hilbrush

@@ -66,7 +66,8 @@ class Descent {
       steepness_[i] = kSteepness * steepness_[i] + (1 - kSteepness) * gradients_[i].squaredNorm();
       const float steep = std::sqrt(steepness_[i] / steepness_share + kCommonShare * kCommonShare * common2);
       const Vector3f way = -length / (motion_share * steep) * motion_[i];
-      if (!move_to(places_[i], curve_, tone_, places_[i].position_O + way.cast<double>())) motion_[i].setZero();
+      if (!move_to(places_[i], curve_.surface(), tone_, places_[i].position_O + way.cast<double>()))
+        motion_[i].setZero();
       exposures_[i].place = paint_.place_of(places_[i].position_O);
       exposures_[i].normal = curve_.mesh().area_vector(places_[i].triangle).normalized().cast<float>();
     });
@@ -107,8 +108,8 @@ DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSeq
   tbb::parallel_for(std::size_t{0}, best_places.size(), [&](std::size_t i) {
     const SurfacePlace& place = best_places[i];
     const float level = dots.dots[i].level;
-    dots.dots[i] = make_dot(curve.implementation(), tone,
-                            surface_point_at(curve.mesh(), place.triangle, place.position_O), place.component);
+    dots.dots[i] = make_dot(curve.surface(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
+                            place.component);
     dots.dots[i].level = level;
   });
   return dots;

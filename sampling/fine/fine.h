@@ -1,7 +1,9 @@
 #pragma once
 #include <functional>
 
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface_curve.h"
+#include "sampling/dots/dots.h"
+#include "sampling/tone/tone_field.h"
 
 /// `fine`: dots that have been placed already are moved for the picture that the paint will show.
 namespace hilbrush {

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "sampling/curve/chart.h"
+#include "sampling/curve/stream_dots.h"
 #include "sampling/curve/surface_place.h"
 
 namespace hilbrush {
@@ -66,7 +68,7 @@ void PaintModel::lay_nodes(const SurfaceCurve& curve, const ToneField& tone) {
   options.dot_count =
       std::max<std::uint64_t>(1, std::llround(kNodesAPitch2 * curve.mesh().area_m2() / (pitch_m_ * pitch_m_)));
   options.dot_limit = std::numeric_limits<std::uint32_t>::max();
-  const DotSequence nodes = place_dots(curve, gray, options);
+  const DotSequence nodes = place_dots(CurveMass(curve, gray), options);
   const std::size_t count = nodes.dots.size();
   places_.resize(count), normals_.resize(count), wanted_.resize(count);
   dose_.assign(count, 0), pull_.assign(count, 0);

@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "sampling/base/input_error.h"
+#include "sampling/curve/chart.h"
 #include "sampling/curve/dot_triangle.h"
+#include "sampling/curve/project_to_surface.h"
 #include "sampling/gaps/dot_path.h"
 #include "sampling/gaps/gap_meter.h"
 #include "sampling/gaps/square_places.h"
@@ -58,21 +60,20 @@ double darkest_at(const ToneField& tone, const TexturedMesh& mesh, const std::ve
 
 class HoleFilling {
  public:
-  HoleFilling(const SurfaceCurve::Implementation& curve, const ToneField& tone, const DotSequence& sequence,
-              double limit_m)
+  HoleFilling(const SurfaceCurve& curve, const ToneField& tone, const DotSequence& sequence, double limit_m)
       : curve_(curve),
         tone_(tone),
         dots_(sequence.dots),
         squares_(curve),
         grid_(dots_, kGridPitches * sequence.pitch_m),
         path_(dots_),
-        meter_(curve, tone, grid_, limit_m, darkest_at(tone, curve.mesh, dots_)) {}
+        meter_(curve.surface(), tone, grid_, limit_m, darkest_at(tone, curve.mesh(), dots_)) {}
 
   /// One Voronoi diagram for each square; returns how many dots it has brought.
   std::uint64_t fill_circles() {
     std::vector<GapMeter::Hole> holes;
-    for (std::uint32_t s = 0; s < curve_.charts.size(); ++s) {
-      if (curve_.charts[s].kind == ChartKind::kHilbertCube) continue;
+    for (std::uint32_t s = 0; s < curve_.charts().size(); ++s) {
+      if (curve_.charts()[s].kind == ChartKind::kHilbertCube) continue;
       auto found = holes_on(s);
       holes.insert(holes.end(), found.begin(), found.end());
     }
@@ -84,7 +85,7 @@ class HoleFilling {
 
   /// Proves all surface covered, or adds a dot.
   std::uint64_t sweep() {
-    const std::size_t triangles = curve_.mesh.triangle_count();
+    const std::size_t triangles = curve_.mesh().triangle_count();
     std::vector<std::vector<GapMeter::Suspect>> suspects(kBlocks);
     tbb::parallel_for(std::size_t{0}, kBlocks, [&](std::size_t block) {
       for (std::size_t t = block * triangles / kBlocks; t < (block + 1) * triangles / kBlocks; ++t)
@@ -108,7 +109,7 @@ class HoleFilling {
   bool fill(const SurfacePoint& point, double slack_m) {
     const GapMeter::Hole hole = meter_.hole_at(point, slack_m);
     if (!(hole.size > 0)) return false;
-    const Dot dot = make_dot(curve_, tone_, point, squares_.component(point.triangle));
+    const Dot dot = make_dot(curve_.surface(), tone_, point, squares_.component(point.triangle));
     const auto nearby = grid_.within(dot.position_O, dot.normal_O, kNeighborhood * hole.radius_m);
     dots_.push_back(dot);
     path_.insert_last(nearby);
@@ -120,12 +121,12 @@ class HoleFilling {
     std::vector<std::uint32_t> members;
     std::vector<Vector2d> places;
     for (std::uint32_t i = 0; i < dots_.size(); ++i) {
-      const auto place = squares_.place(point_of(curve_.mesh, dots_[i]));
+      const auto place = squares_.place(point_of(curve_.mesh(), dots_[i]));
       if (!place || place->chart != chart) continue;
       members.push_back(i);
       places.push_back(place->place);
     }
-    const auto triples = voronoi_triples(places, curve_.charts[chart].square_count);
+    const auto triples = voronoi_triples(places, curve_.charts()[chart].square_count);
     std::vector<GapMeter::Hole> holes(triples.size());
     tbb::parallel_for(std::size_t{0}, triples.size(), [&](std::size_t i) {
       holes[i] = hole_between(members[triples[i][0]], members[triples[i][1]], members[triples[i][2]]);
@@ -140,11 +141,11 @@ class HoleFilling {
     if (!center) return {};
     const double radius = (*center - dots_[a].position_O).norm();
     if (radius < (1 - kMargin) * meter_.strictest_m()) return {};
-    SurfacePoint point = point_of(curve_.mesh, dots_[std::min({a, b, c})]);
-    double distance = (position(curve_.mesh, point) - *center).norm();
+    SurfacePoint point = point_of(curve_.mesh(), dots_[std::min({a, b, c})]);
+    double distance = (position(curve_.mesh(), point) - *center).norm();
     for (int walk = 0; walk < kMaxWalks; ++walk) {
-      const SurfacePoint next = walk_towards(curve_.mesh, curve_.neighbors, point, *center);
-      const double nearer = (position(curve_.mesh, next) - *center).norm();
+      const SurfacePoint next = walk_towards(curve_.surface(), point, *center);
+      const double nearer = (position(curve_.mesh(), next) - *center).norm();
       if (!(nearer < distance)) break;
       point = next;
       distance = nearer;
@@ -152,7 +153,7 @@ class HoleFilling {
     return meter_.hole_at(point, slack_at(point));
   }
 
-  const SurfaceCurve::Implementation& curve_;
+  const SurfaceCurve& curve_;
   const ToneField& tone_;
   std::vector<Dot> dots_;
   SquarePlaces squares_;
@@ -169,7 +170,7 @@ DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequ
     throw InputError("largest_gap", "must be at least .5 pitches: a gap that small asks for a dot everywhere");
   FillReport result;
   if (!dots.dots.empty()) {
-    HoleFilling filling(curve.implementation(), tone, dots, largest_gap_pitches * dots.pitch_m);
+    HoleFilling filling(curve, tone, dots, largest_gap_pitches * dots.pitch_m);
     for (std::uint64_t added = 1; added > 0 && result.voronoi_rounds < kMaxRounds; ++result.voronoi_rounds) {
       added = filling.fill_circles();
       result.added += added;

@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "sampling/base/progress.h"
-#include "sampling/curve/stream_dots.h"
+#include "sampling/curve/surface_curve.h"
 #include "sampling/dots/dots.h"
 #include "sampling/tone/tone_field.h"
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "sampling/curve/project_to_surface.h"
+
 namespace hilbrush {
 namespace {
 
@@ -22,23 +24,22 @@ constexpr double kOneTone = .25;
 
 }  // namespace
 
-GapMeter::GapMeter(const SurfaceCurve::Implementation& curve, const ToneField& tone, const DotGrid& grid,
-                   double limit_m, double darkest)
-    : curve_(curve), tone_(tone), grid_(grid), limit_(limit_m), darkest_(darkest) {}
+GapMeter::GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m, double darkest)
+    : surface_(surface), tone_(tone), grid_(grid), limit_(limit_m), darkest_(darkest) {}
 
 double GapMeter::strictest_m() const {
   return limit_ / std::sqrt(darkest_);
 }
 
 double GapMeter::mean_tone(const SurfacePoint& point, double radius_m) const {
-  const Vector3d middle = position(curve_.mesh, point), normal = face_normal(curve_.mesh, point);
+  const Vector3d middle = position(surface_.mesh, point), normal = face_normal(surface_.mesh, point);
   const Vector3d across = normal.unitOrthogonal(), along = normal.cross(across);
   double sum = 0;
   for (int k = 0; k < kLooks; ++k) {
     // Vogel's sunflower: even over the disc.
     const double r = radius_m * std::sqrt((k + .5) / kLooks), turn = k * std::numbers::pi * (3 - std::sqrt(5.));
     const Vector3d target = middle + r * (std::cos(turn) * across + std::sin(turn) * along);
-    sum += tone_.asked(walk_towards(curve_.mesh, curve_.neighbors, point, target));
+    sum += tone_.asked(walk_towards(surface_, point, target));
   }
   return sum / kLooks;
 }
@@ -48,8 +49,8 @@ GapMeter::Hole GapMeter::hole_at(const SurfacePoint& point, double slack_m) cons
   const double asked = tone_.asked(point);
   if (!(asked > 0)) return hole;
   const double allowed = limit_ / std::sqrt(asked);
-  const Vector3d place = position(curve_.mesh, point);
-  const Eigen::Vector3f normal = face_normal(curve_.mesh, point).cast<float>();
+  const Vector3d place = position(surface_.mesh, point);
+  const Eigen::Vector3f normal = face_normal(surface_.mesh, point).cast<float>();
   const DotGrid::Nearest nearest = grid_.nearest(place, normal, kFarthest * allowed);
   const double radius = nearest.dot == DotGrid::kNone ? kFarthest * allowed : nearest.distance_m;
   if (radius + slack_m <= allowed) return hole;
@@ -61,8 +62,8 @@ GapMeter::Hole GapMeter::hole_at(const SurfacePoint& point, double slack_m) cons
 GapMeter::Verdict GapMeter::judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& center,
                                   double radius_m) const {
   const double strictest = strictest_m();
-  const Vector3d place = position(curve_.mesh, center);
-  const Eigen::Vector3f normal = face_normal(curve_.mesh, center).cast<float>();
+  const Vector3d place = position(surface_.mesh, center);
+  const Eigen::Vector3f normal = face_normal(surface_.mesh, center).cast<float>();
   if (radius_m < strictest && grid_.nearest(place, normal, strictest - radius_m).dot != DotGrid::kNone)
     return Verdict::kCovered;
 
@@ -84,7 +85,7 @@ GapMeter::Verdict GapMeter::judge(std::uint32_t triangle, const Corners& corners
 void GapMeter::find_suspects(std::uint32_t triangle, std::vector<Suspect>& suspects) const {
   if (tone_.is_blank(triangle)) return;
   std::vector<Corners> waiting{{Vector3d::UnitX(), Vector3d::UnitY(), Vector3d::UnitZ()}};
-  const auto place_of = [&](const Vector3d& b) { return position(curve_.mesh, {triangle, b}); };
+  const auto place_of = [&](const Vector3d& b) { return position(surface_.mesh, {triangle, b}); };
   while (!waiting.empty()) {
     const Corners corners = waiting.back();
     waiting.pop_back();
@@ -100,8 +101,8 @@ void GapMeter::find_suspects(std::uint32_t triangle, std::vector<Suspect>& suspe
       return std::max({(places[0] - from).norm(), (places[1] - from).norm(), (places[2] - from).norm()});
     };
     const SurfacePoint centroid{triangle, (corners[0] + corners[1] + corners[2]) / 3}, middle{triangle, middle_b};
-    const double from_centroid = reach(position(curve_.mesh, centroid)),
-                 from_middle = reach(position(curve_.mesh, middle));
+    const double from_centroid = reach(position(surface_.mesh, centroid)),
+                 from_middle = reach(position(surface_.mesh, middle));
     const bool is_centroid = from_centroid <= from_middle;
     const double radius = std::min(from_centroid, from_middle);
     switch (judge(triangle, corners, is_centroid ? centroid : middle, radius)) {

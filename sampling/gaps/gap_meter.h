@@ -1,8 +1,9 @@
 #pragma once
 #include <vector>
 
-#include "sampling/curve/project_to_surface.h"
+#include "sampling/curve/surface.h"
 #include "sampling/gaps/dot_grid.h"
+#include "sampling/tone/tone_field.h"
 
 /// Whether a place is the middle of a hole; see fill_holes.h for what a gap is.
 namespace hilbrush {
@@ -10,8 +11,7 @@ namespace hilbrush {
 class GapMeter {
  public:
   /// Keeps references. `limit_m` is the largest gap in meters at tone 1; `darkest` the largest asked tone.
-  GapMeter(const SurfaceCurve::Implementation& curve, const ToneField& tone, const DotGrid& grid, double limit_m,
-           double darkest);
+  GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m, double darkest);
 
   double limit_m() const { return limit_; }
   /// What is allowed where the tone is darkest.
@@ -41,7 +41,7 @@ class GapMeter {
   enum class Verdict { kCovered, kSuspect, kTooLarge };
   Verdict judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& center, double radius_m) const;
 
-  const SurfaceCurve::Implementation& curve_;
+  const Surface& surface_;
   const ToneField& tone_;
   const DotGrid& grid_;
   double limit_, darkest_;

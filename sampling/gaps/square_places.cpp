@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sampling/curve/chart.h"
+
 namespace hilbrush {
 namespace {
 
@@ -21,10 +23,10 @@ Vector3d weights_in(const std::array<Vector2d, 3>& corners_b, const Vector2d& b)
 
 }  // namespace
 
-SquarePlaces::SquarePlaces(const SurfaceCurve::Implementation& curve) : curve_(curve) {
-  components_.assign(curve.mesh.triangle_count(), 0);
-  first_.assign(curve.mesh.triangle_count() + 1, 0);
-  for (const Chart& chart : curve.charts)
+SquarePlaces::SquarePlaces(const SurfaceCurve& curve) : curve_(curve) {
+  components_.assign(curve.mesh().triangle_count(), 0);
+  first_.assign(curve.mesh().triangle_count() + 1, 0);
+  for (const Chart& chart : curve.charts())
     for (const ChartFace& face : chart.faces) {
       components_[face.triangle] = chart.component;
       ++first_[face.triangle + 1];
@@ -32,9 +34,9 @@ SquarePlaces::SquarePlaces(const SurfaceCurve::Implementation& curve) : curve_(c
   for (std::size_t t = 1; t < first_.size(); ++t) first_[t] += first_[t - 1];
   faces_.resize(first_.back());
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for (std::uint32_t s = 0; s < curve.charts.size(); ++s)
-    for (std::uint32_t f = 0; f < curve.charts[s].faces.size(); ++f)
-      faces_[next[curve.charts[s].faces[f].triangle]++] = {s, f};
+  for (std::uint32_t s = 0; s < curve.charts().size(); ++s)
+    for (std::uint32_t f = 0; f < curve.charts()[s].faces.size(); ++f)
+      faces_[next[curve.charts()[s].faces[f].triangle]++] = {s, f};
 }
 
 std::optional<SquarePlaces::Place> SquarePlaces::place(const SurfacePoint& point) const {
@@ -42,7 +44,7 @@ std::optional<SquarePlaces::Place> SquarePlaces::place(const SurfacePoint& point
   std::optional<Place> best;
   double deepest = -1e300;
   for (std::uint32_t i = first_[point.triangle]; i < first_[point.triangle + 1]; ++i) {
-    const Chart& chart = curve_.charts[faces_[i].chart];
+    const Chart& chart = curve_.charts()[faces_[i].chart];
     if (chart.kind == ChartKind::kHilbertCube) continue;
     const ChartFace& face = chart.faces[faces_[i].face];
     const Vector3d weights = weights_in(chart.corners_b(face), b);

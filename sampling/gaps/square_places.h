@@ -10,7 +10,7 @@ namespace hilbrush {
 class SquarePlaces {
  public:
   /// Keeps a reference to `curve`. Cost O(triangles), 12 bytes each.
-  explicit SquarePlaces(const SurfaceCurve::Implementation& curve);
+  explicit SquarePlaces(const SurfaceCurve& curve);
 
   std::uint32_t component(std::uint32_t triangle) const { return components_[triangle]; }
 
@@ -22,7 +22,7 @@ class SquarePlaces {
   std::optional<Place> place(const SurfacePoint& point) const;
 
  private:
-  const SurfaceCurve::Implementation& curve_;
+  const SurfaceCurve& curve_;
   std::vector<std::uint32_t> components_;
   /// Faces by triangle: faces_[first_[t]] .. faces_[first_[t + 1]].
   struct FaceIndex {

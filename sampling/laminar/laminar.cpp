@@ -79,18 +79,12 @@ double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, s
   return best;
 }
 
-void check_limit(double count, std::uint64_t limit) {
-  if (!(count <= static_cast<double>(limit)))
-    throw InputError("", "the object would need " + std::to_string(static_cast<std::uint64_t>(std::min(count, 1e18))) +
-                             " dots, more than the limit of " + std::to_string(limit) + ": lower the dpi or the size");
-}
-
 /// Where the walk is, and where along it the dots go.
 class SliceWalk {
  public:
-  SliceWalk(const SurfaceCurve::Implementation& curve, const std::vector<std::uint32_t>& component_of,
-            const ToneField& tone, double pitch_m, double spacing_m)
-      : curve_(curve), component_of_(component_of), tone_(tone), pitch_(pitch_m), spacing_(spacing_m) {}
+  SliceWalk(const Surface& surface, const std::vector<std::uint32_t>& component_of, const ToneField& tone,
+            double pitch_m, double spacing_m)
+      : surface_(surface), component_of_(component_of), tone_(tone), pitch_(pitch_m), spacing_(spacing_m) {}
 
   void walk_slice(std::vector<Contour> contours) {
     while (!contours.empty()) {
@@ -140,7 +134,7 @@ class SliceWalk {
       for (double next = next_dot(); passed_ >= next; next = next_dot()) {
         const double share = std::clamp((next - before) / mass, 0., 1.);
         dots_.push_back(
-            make_dot(curve_, tone_, point_on(piece, from + share * (to - from)), component_of_[piece.triangle]));
+            make_dot(surface_, tone_, point_on(piece, from + share * (to - from)), component_of_[piece.triangle]));
       }
     });
   }
@@ -148,7 +142,7 @@ class SliceWalk {
   /// The toned length at which the next dot is due.
   double next_dot() const { return (static_cast<double>(dots_.size()) + .5) * spacing_; }
 
-  const SurfaceCurve::Implementation& curve_;
+  const Surface& surface_;
   const std::vector<std::uint32_t>& component_of_;
   const ToneField& tone_;
   double pitch_, spacing_;
@@ -156,12 +150,6 @@ class SliceWalk {
   std::optional<Vector3d> here_;
   std::vector<Dot> dots_;
 };
-
-double path_length(const std::vector<Dot>& dots) {
-  double length = 0;
-  for (std::size_t i = 1; i < dots.size(); ++i) length += (dots[i].position_O - dots[i - 1].position_O).norm();
-  return length;
-}
 
 std::vector<std::uint32_t> components_of(const TexturedMesh& mesh, const Neighbors& neighbors) {
   std::vector<std::uint32_t> component_of(mesh.triangle_count(), 0);
@@ -184,14 +172,11 @@ double painted_area(const TexturedMesh& mesh, const ToneField& tone) {
 
 DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const SampleOptions& options,
                           SampleReport* report, const Progress& progress) {
-  if (options.pitch_m.has_value() == options.dot_count.has_value())
-    throw InputError("", "give either dpi or the number of dots, not both and not neither");
-  if (options.pitch_m && !(*options.pitch_m > 0)) throw InputError("", "the pitch must be more than 0 mm");
-  if (options.dot_count && *options.dot_count < 1) throw InputError("", "the number of dots must be at least 1");
+  check_pitch_or_count(options);
   DotSequence sequence;
   const double mass = sliced_mass(mesh, tone);
   const double pitch = options.pitch_m ? *options.pitch_m : pitch_for(mesh, tone, mass, *options.dot_count);
-  check_limit(options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch), options.dot_limit);
+  check_dot_limit(options, options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch));
   const auto [low, high] = bounds(mesh);
   if ((high.z() - low.z()) / pitch > kMaxSlices) throw InputError("", "too many slices: lower the dpi or the size");
   sequence.pitch_m = pitch;
@@ -200,11 +185,9 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   const std::uint64_t count = options.dot_count.value_or(static_cast<std::uint64_t>(std::llround(length / pitch)));
   if (count == 0) return sequence;
 
-  SurfaceCurve::Implementation surroundings(mesh);
-  surroundings.neighbors = find_neighbors(mesh.triangles);
-  surroundings.dot_surfaces = find_dot_surfaces(mesh, surroundings.neighbors);
-  const std::vector<std::uint32_t> component_of = components_of(mesh, surroundings.neighbors);
-  SliceWalk walk(surroundings, component_of, tone, pitch, length / static_cast<double>(count));
+  const Surface surface(mesh);
+  const std::vector<std::uint32_t> component_of = components_of(mesh, surface.neighbors);
+  SliceWalk walk(surface, component_of, tone, pitch, length / static_cast<double>(count));
   for (std::size_t k = 0; k < slices.count(); ++k) {
     walk.walk_slice(join(slices.pieces(k)));
     progress.step(k + 1, slices.count());
@@ -212,10 +195,11 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   sequence.dots = walk.take_dots();
   CHECK_EQ(sequence.dots.size(), count);
   if (report) {
-    report->path_length_m = path_length(sequence.dots);
     report->painted_area_m2 = painted_area(mesh, tone);
-    report->path_constant = report->path_length_m / std::sqrt(static_cast<double>(count) * report->painted_area_m2);
     report->patch_count = slices.piece_count();
+    PathMeter meter(*report);
+    meter.follow(sequence.dots);
+    meter.finish();
   }
   return sequence;
 }

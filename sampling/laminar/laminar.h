@@ -1,7 +1,8 @@
 #pragma once
 #include "sampling/base/progress.h"
-#include "sampling/curve/stream_dots.h"
 #include "sampling/dots/dots.h"
+#include "sampling/dots/path_meter.h"
+#include "sampling/options/sample_options.h"
 #include "sampling/tone/tone_field.h"
 
 /// Laminar slicing: what space-filling curves replace, as a baseline (the thesis, section 7.3, figures 7.11 and 7.14 to

@@ -15,6 +15,8 @@ struct ToneCurve {
   std::vector<double> asked;   ///< rising, same length; both empty: identity
 
   double operator()(double coverage) const;
+  /// The wanted coverage for which the curve asks this much; where `asked` stays level, the start of that part.
+  double inverse(double asked_coverage) const;
 };
 
 /// What to do with surface that has neither texture nor colors.

@@ -6,6 +6,8 @@
 #include <string>
 
 #include "sampling/base/check.h"
+#include "sampling/base/cross.h"
+#include "sampling/base/frame.h"
 #include "sampling/base/input_error.h"
 
 namespace hilbrush {
@@ -29,17 +31,6 @@ int corner_opposite_longest_edge(const TexturedMesh& mesh, std::size_t t) {
     if (squared > longest) longest = squared, apex = c;
   }
   return apex;
-}
-
-/// Two unit vectors that make a right-handed frame with the third (Duff et al. 2017).
-void complete_basis(const Eigen::Vector3d& z, Eigen::Vector3d& x, Eigen::Vector3d& y) {
-  const double sign = std::copysign(1., z.z()), a = -1 / (sign + z.z()), b = z.x() * z.y() * a;
-  x = {1 + sign * z.x() * z.x() * a, sign * b, -sign * z.x()};
-  y = {b, sign + z.y() * z.y() * a, -z.y()};
-}
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
 }
 
 }  // namespace
@@ -100,9 +91,10 @@ FilmLattice::Frame FilmLattice::frame_of(std::uint32_t triangle, const Eigen::Ve
   const Eigen::Vector3d& origin = mesh_.corner(triangle, (grid.apex + 1) % 3);
   const Eigen::Vector3d along = (mesh_.corner(triangle, (grid.apex + 2) % 3) - origin).normalized();
   const Eigen::Vector3d up = mesh_.area_vector(triangle).cross(along).normalized();
-  Eigen::Vector3d x, y;
-  complete_basis(axis_O, x, y);
-  const auto across = [&](const Eigen::Vector3d& v) { return Eigen::Vector2d(x.dot(v), y.dot(v)); };
+  const Eigen::Matrix3d axes = frame_about(axis_O);
+  const auto across = [&](const Eigen::Vector3d& v) {
+    return Eigen::Vector2d(axes.col(0).dot(v), axes.col(1).dot(v));
+  };
   const Eigen::Vector3d from_axis = origin - center_O;
   return {across(from_axis), across(along),  across(up), axis_O.dot(from_axis),
           axis_O.dot(along), axis_O.dot(up), radius_m,   grid};

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 #include "sampling/quality/quality.h"
 #include "tests/support/meshes.h"
 #include "tests/support/subdivide.h"

@@ -167,7 +167,7 @@ void run(int argc, char** argv) {
   const SurfaceCurve curve(mesh);
   std::size_t quads = 0, listed = 0;
   Seconds tree;
-  for (const Chart& chart : curve.implementation().charts) {
+  for (const Chart& chart : curve.charts()) {
     Chart again = chart;
     tree.cpu += time(kRepeats, [&] {
                   again.base_quads.clear();

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/fine/fine.h"
+#include "sampling/place_dots.h"
 #include "tests/bench/dither_pictures.h"
 #include "tests/support/meshes.h"
 

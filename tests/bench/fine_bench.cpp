@@ -13,6 +13,7 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 #include "sim/film/fidelity.h"
 #include "tests/bench/process_usage.h"
 

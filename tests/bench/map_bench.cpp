@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/disk/cut_to_disk.h"
 #include "sampling/disk/square_map.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/subdivide.h"
 

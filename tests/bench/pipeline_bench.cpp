@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,11 @@
 #include "planner/check/program_check.h"
 #include "planner/plan.h"
 #include "sampling/base/sha256.h"
-#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 
 namespace {
 
@@ -73,8 +74,8 @@ void run(const std::string& model_file, double size_mm, double dpi, Stopwatch& w
   SampleReport report;
   const DotSequence dots =
       watch.time("dots", [&] { return place_dots(curve, tone, sample_options(settings), &report); });
-  const Reach reach = watch.time("reach", [&] { return Reach(repaired.mesh, cell, options); });
-  const Plan plan = watch.time("plan", [&] { return plan_exposures(reach, dots); });
+  const auto reach = watch.time("reach", [&] { return std::make_unique<Reach>(repaired.mesh, cell, options); });
+  const Plan plan = watch.time("plan", [&] { return plan_exposures(*reach, dots); });
   const auto faults = watch.time(
       "check", [&] { return check_program(plan.program, plan.skipped, dots, repaired.mesh, cell, options); });
   if (!is_last) return;

@@ -16,11 +16,11 @@
 
 #include "config/job_settings.h"
 #include "sampling/base/input_error.h"
-#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 #include "sampling/quality/quality.h"
 #include "tests/bench/answer_hash.h"
 

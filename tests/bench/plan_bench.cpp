@@ -25,12 +25,12 @@
 #include "planner/plan.h"
 #include "planner/poses/posed_dots.h"
 #include "sampling/base/angles.h"
-#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/laminar/laminar.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 #include "tests/bench/answer_hash.h"
 #include "tests/bench/process_usage.h"
 #include "tests/planner/reach/pose_grid.h"
@@ -169,7 +169,7 @@ void Bench::explain_skipped(const Plan& plan, const DotSequence& dots, const Rea
   std::vector<std::uint32_t> out_of_reach;
   for (const SkippedDot& skipped : plan.skipped) {
     ++reasons[std::string(skipped.what)];
-    if (skipped.reason != SkipReason::kEnergy && skipped.reason != SkipReason::kNoWay)
+    if (skipped.reason != SkipReason::kEnergy && skipped.reason != SkipReason::kNoPath)
       out_of_reach.push_back(skipped.dot_index);
   }
   for (const auto& [what, times] : reasons) std::printf("  skipped: %zu, %s\n", times, what.c_str());
@@ -177,7 +177,7 @@ void Bench::explain_skipped(const Plan& plan, const DotSequence& dots, const Rea
   std::size_t confirmed = 0;
   for (std::size_t k = 0; k < looks; ++k) {
     const std::uint32_t dot = out_of_reach[k * out_of_reach.size() / looks];
-    const PoseGridAnswer answer = search_pose_grid(reach.implementation(), target_of(dots.dots[dot]), kDegree);
+    const PoseGridAnswer answer = search_pose_grid(reach, target_of(dots.dots[dot]), kDegree);
     confirmed += !answer.is_reached;
     if (answer.is_reached) std::printf("  dot %u can be reached after all\n", dot);
   }

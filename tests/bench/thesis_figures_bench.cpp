@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/gaps/fill_holes.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
@@ -20,6 +19,7 @@
 #include "sampling/model/placement.h"
 #include "sampling/parametric/parametric.h"
 #include "sampling/parametric/point_sets.h"
+#include "sampling/place_dots.h"
 #include "sampling/quality/plot.h"
 #include "sampling/quality/quality.h"
 #include "tests/bench/answer_hash.h"

@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
 #include "sampling/parametric/parametric.h"
 #include "sampling/parametric/point_sets.h"
+#include "sampling/place_dots.h"
 #include "sampling/quality/plot.h"
 #include "sampling/quality/quality.h"
 #include "tests/bench/answer_hash.h"

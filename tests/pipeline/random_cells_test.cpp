@@ -13,8 +13,8 @@
 #include "planner/check/program_check.h"
 #include "planner/plan.h"
 #include "sampling/base/input_error.h"
-#include "sampling/curve/stream_dots.h"
 #include "sampling/model/mesh_repair.h"
+#include "sampling/place_dots.h"
 #include "sim/film/film.h"
 #include "tests/pipeline/tick_witness.h"
 
@@ -24,9 +24,16 @@ namespace hilbrush::testing_pipeline {
 namespace {
 
 struct Campaign {
-  std::size_t works = 0, without_surface = 0, without_program = 0, dots = 0, exposed = 0, ticks = 0;
+  std::size_t works = 0;
+  std::size_t without_surface = 0;
+  std::size_t without_program = 0;
+  std::size_t dots = 0;
+  std::size_t exposed = 0;
+  std::size_t ticks = 0;
   std::map<std::string, std::size_t> skipped;
-  double worst_hit_um = 0, slowest_s = 0, worst_eta = 0;
+  double worst_hit_um = 0;
+  double slowest_s = 0;
+  double worst_eta = 0;
   std::uint64_t slowest_seed = 0;
 };
 

@@ -8,6 +8,7 @@
 #include "sampling/model/mesh_repair.h"
 #include "sampling/model/model_file.h"
 #include "sampling/model/placement.h"
+#include "sampling/place_dots.h"
 
 namespace hilbrush {
 namespace {

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "sampling/base/input_error.h"
+#include "sampling/place_dots.h"
 #include "sampling/quality/quality.h"
 #include "tests/support/meshes.h"
 

@@ -11,6 +11,7 @@
 #include "sampling/curve/patches.h"
 #include "sampling/curve/surface_curve.h"
 #include "sampling/model/mesh_repair.h"
+#include "sampling/place_dots.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

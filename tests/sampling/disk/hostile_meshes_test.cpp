@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "sampling/curve/stream_dots.h"
 #include "sampling/disk/chain.h"
 #include "sampling/model/mesh_repair.h"
+#include "sampling/place_dots.h"
 
 namespace hilbrush {
 namespace {

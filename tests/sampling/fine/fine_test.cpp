@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "sampling/base/input_error.h"
+#include "sampling/place_dots.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -11,6 +11,7 @@
 #include "sampling/gaps/dot_grid.h"
 #include "sampling/gaps/dot_path.h"
 #include "sampling/gaps/voronoi_places.h"
+#include "sampling/place_dots.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

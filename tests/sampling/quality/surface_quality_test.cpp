@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "sampling/base/input_error.h"
-#include "sampling/curve/stream_dots.h"
 #include "sampling/model/nearest_in_triangle.h"
+#include "sampling/place_dots.h"
 #include "sampling/quality/quality.h"
 #include "tests/sampling/quality/point_sets.h"
 #include "tests/support/meshes.h"

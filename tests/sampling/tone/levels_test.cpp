@@ -5,7 +5,7 @@
 #include <array>
 #include <map>
 
-#include "sampling/curve/stream_dots.h"
+#include "sampling/place_dots.h"
 #include "tests/support/meshes.h"
 
 namespace hilbrush {

@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "sampling/curve/stream_dots.h"
+#include "sampling/place_dots.h"
 #include "sim/film/fidelity.h"
 #include "sim/film/picture_means.h"
 #include "tests/sim/test_objects.h"
