@@ -107,7 +107,7 @@ class AskedTexels {
       visit_nodes(layout_, t, 1,
                   [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon&) {
                     if (!(tones[texel] > 0)) return;
-                    const double wanted = tone_for(tones[texel]) + correction.at(frame, t, node);
+                    const double wanted = curve_.inverse(tones[texel]) + correction.at(frame, t, node);
                     tones[texel] = static_cast<float>(curve_(std::clamp(wanted, 0., 1.)));
                   });
     });
@@ -152,17 +152,6 @@ class AskedTexels {
     });
   }
 
-  /// The wanted tone that asks for so much.
-  double tone_for(double asked) const {
-    if (curve_.wanted.empty()) return asked;
-    const auto above = std::lower_bound(curve_.asked.begin(), curve_.asked.end(), asked);
-    if (above == curve_.asked.begin()) return curve_.wanted.front();
-    if (above == curve_.asked.end()) return curve_.wanted.back();
-    const auto k = static_cast<std::size_t>(above - curve_.asked.begin());
-    const double share = (asked - curve_.asked[k - 1]) / (curve_.asked[k] - curve_.asked[k - 1]);
-    return curve_.wanted[k - 1] + share * (curve_.wanted[k] - curve_.wanted[k - 1]);
-  }
-
   AtlasLayout layout_;
   const ToneField& asked_;
   const ToneCurve& curve_;
@@ -171,8 +160,8 @@ class AskedTexels {
 
 /// The heaviest spot of what is asked for in a box of the triangle, by halving it towards its mass; none if the box is
 /// blank.
-std::optional<SurfacePoint> point_with_tone(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
-                                            Vector2d low, Vector2d high) {
+std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
+                                           Vector2d low, Vector2d high) {
   constexpr int kMaxSteps = 40;
   ToneIntegral integral = asked.integrate(triangle, frame.clip_box(low, high).corners());
   for (int halving = 0; halving < kMaxSteps && integral.mass > 0; ++halving) {
@@ -203,7 +192,7 @@ void return_strays(DotSequence& dots, const ToneField& asked) {
     const Vector2d place = frame.place(point.barycentric);
     for (double reach_m = kTexelPitches * dots.pitch_m; reach_m < 8 * dots.pitch_m; reach_m *= 2) {
       const Vector2d reach = Vector2d::Constant(reach_m);
-      const auto toned = point_with_tone(asked, frame, dot.triangle, place - reach, place + reach);
+      const auto toned = heaviest_point(asked, frame, dot.triangle, place - reach, place + reach);
       if (!toned) continue;
       dot.position_O = position(mesh, *toned);
       dot.tone = static_cast<float>(asked.wanted(*toned));

@@ -16,16 +16,6 @@ namespace {
 /// jumps.
 constexpr double kRamp = 1e-5;
 
-/// What must be wanted for `curve` to ask for this much, on its rising part.
-double wanted_for(const ToneCurve& curve, double asked) {
-  const auto above = std::lower_bound(curve.asked.begin(), curve.asked.end(), asked);
-  if (above == curve.asked.begin()) return curve.wanted.front();
-  if (above == curve.asked.end()) return curve.wanted.back();
-  const auto k = static_cast<std::size_t>(above - curve.asked.begin());
-  const double share = (asked - curve.asked[k - 1]) / (curve.asked[k] - curve.asked[k - 1]);
-  return curve.wanted[k - 1] + share * (curve.wanted[k] - curve.wanted[k - 1]);
-}
-
 /// Energy a dot here stands for: coverage asked over dots placed, within half a pitch and the dot's triangle.
 double local_energy(const Dot& dot, double pitch_m, const ToneField& asked, const ToneField& density) {
   const TriangleFrame frame(asked.mesh(), dot.triangle);
@@ -100,7 +90,7 @@ ToneCurve density_curve(const ToneCurve& curve, std::span<const double> levels) 
   std::size_t level = 0;
   for (std::size_t k = 0; k < asked.wanted.size(); ++k) {
     while (level + 1 < levels.size() && asked.asked[k] > kEnoughDots * levels[level]) {
-      const double taken_over = wanted_for(asked, kEnoughDots * levels[level]);
+      const double taken_over = asked.inverse(kEnoughDots * levels[level]);
       add(taken_over, kEnoughDots);
       const double next = std::min(taken_over + kRamp, asked.wanted[k]);
       add(next, asked(next) / levels[level + 1]);
