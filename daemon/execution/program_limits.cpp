@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kJointTolerance = 1e-9;  ///< rad or m: what arithmetic may put outside a limit
 
-std::string millimeters_or_degrees(int axis, double value) {
+std::string millimeters_or_degrees(std::size_t axis, double value) {
   const bool is_prismatic = axis == kJ3;
   const double figure = is_prismatic ? value * 1e3 : value * 180 / std::numbers::pi;
   std::string text = std::to_string(std::round(figure * 1e3) / 1e3);
@@ -33,12 +33,11 @@ bool is_within_limits(const CellDescription& cell, const Joints& target) {
 }
 
 void check_pose(const CellDescription& cell, const Joints& target, std::size_t exposure) {
-  for (int axis = 0; axis < kAxisCount; ++axis) {
-    const auto place = static_cast<std::size_t>(axis);
-    const auto& limits = cell.axes[place];
-    if (is_within(limits, target[place])) continue;
-    throw ProgramRefused("the program asks axis " + std::string(kAxisNames[place]) + " for " +
-                         millimeters_or_degrees(axis, target[place]) + " at exposure " + std::to_string(exposure) +
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const auto& limits = cell.axes[axis];
+    if (is_within(limits, target[axis])) continue;
+    throw ProgramRefused("the program asks axis " + std::string(kAxisNames[axis]) + " for " +
+                         millimeters_or_degrees(axis, target[axis]) + " at exposure " + std::to_string(exposure) +
                          ", outside its limits " + millimeters_or_degrees(axis, limits.min) + " to " +
                          millimeters_or_degrees(axis, limits.max));
   }

@@ -5,6 +5,12 @@
 
 namespace hilbrush {
 
+Joints home_joints(const CellDescription& cell) {
+  Joints home;
+  for (std::size_t i = 0; i < kAxisCount; ++i) home[i] = cell.axes[i].home;
+  return home;
+}
+
 double spot_diameter_m(const CellDescription& cell, double pitch_m) {
   return cell.laser.spot_diameter_m.value_or(cell.laser.spot_pitches * pitch_m);
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,8 +17,14 @@
 /// Ry(-A) * T(0, 0, plate_height_m + post_height_m) * Rz(C).
 namespace hilbrush {
 
-inline constexpr int kAxisCount = 6;
-enum AxisIndex { kJ1, kJ2, kJ3, kJ4, kTilt, kRotation };
+inline constexpr std::size_t kAxisCount = 6;
+/// Indices into Joints.
+inline constexpr std::size_t kJ1 = 0;
+inline constexpr std::size_t kJ2 = 1;
+inline constexpr std::size_t kJ3 = 2;
+inline constexpr std::size_t kJ4 = 3;
+inline constexpr std::size_t kTilt = 4;
+inline constexpr std::size_t kRotation = 5;
 /// J1, J2, J3, J4, A, C; rad, J3 in m.
 using Joints = std::array<double, kAxisCount>;
 inline constexpr std::array<const char*, kAxisCount> kAxisNames{"j1", "j2", "j3", "j4", "a", "c"};
@@ -108,6 +115,8 @@ struct CellDescription {
   } simulation;
 };
 
+/// Where all axes rest after homing.
+Joints home_joints(const CellDescription& cell);
 /// Spot diameter (1/e2) for dots at this pitch.
 double spot_diameter_m(const CellDescription& cell, double pitch_m);
 /// Energy of a dot of level 1: the full dose over one pitch squared.

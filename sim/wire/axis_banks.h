@@ -13,7 +13,7 @@ namespace hilbrush {
 /// What all these drives have in common: an axis of the cell, in steps, and an alarm.
 class DriveAxis {
  public:
-  DriveAxis(int axis, double steps_per_unit, TrueCell& cell, FaultInjector& faults, TimeRecord& times)
+  DriveAxis(std::size_t axis, double steps_per_unit, TrueCell& cell, FaultInjector& faults, TimeRecord& times)
       : axis_(axis), steps_per_unit_(steps_per_unit), cell_(cell), faults_(faults), times_(times) {}
 
   /// What the drive reports; while a stale report lasts, what it was when that began.
@@ -42,7 +42,7 @@ class DriveAxis {
  private:
   Report present() const;
 
-  const int axis_;
+  const std::size_t axis_;
   const double steps_per_unit_;
   TrueCell& cell_;
   FaultInjector& faults_;

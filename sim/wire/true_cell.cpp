@@ -9,7 +9,7 @@ namespace hilbrush {
 
 TrueCell::TrueCell(const CellDescription& description, const TrueCellOptions& options)
     : description_(description), options_(options), power_max_w_(description.laser.power_max_w) {
-  for (int i = 0; i < kAxisCount; ++i) displace_axis(i, limits(i).home);
+  for (std::size_t i = 0; i < kAxisCount; ++i) displace_axis(i, limits(i).home);
 }
 
 void TrueCell::advance(double now_s) {
@@ -36,14 +36,14 @@ double TrueCell::next_event_s() const {
   return next;
 }
 
-void TrueCell::move_axis(int axis, double target, double speed_scale) {
+void TrueCell::move_axis(std::size_t axis, double target, double speed_scale) {
   const AxisDescription& description = limits(axis);
   move_axis(axis, target, description.speed_max * speed_scale, description.acceleration_max * speed_scale);
 }
 
-void TrueCell::move_axis(int index, double target, double speed_max, double acceleration) {
+void TrueCell::move_axis(std::size_t index, double target, double speed_max, double acceleration) {
   const AxisDescription& description = limits(index);
-  Axis& axis = axes_[static_cast<std::size_t>(index)];
+  Axis& axis = axes_[index];
   const double distance = std::abs(target - axis.motion.position(now_s_) - drift(axis));
   axis.target = target;
   if (axis.is_jammed) return;
@@ -53,8 +53,8 @@ void TrueCell::move_axis(int index, double target, double speed_max, double acce
                std::min(acceleration, description.acceleration_max), share);
 }
 
-void TrueCell::begin_motion(int index, double target, double speed_max, double acceleration, double share) {
-  Axis& axis = axes_[static_cast<std::size_t>(index)];
+void TrueCell::begin_motion(std::size_t index, double target, double speed_max, double acceleration, double share) {
+  Axis& axis = axes_[index];
   // Light that is on while something begins to move is a fault, whoever asked for either.
   if (emission_) emission_->is_moving = true;
   if (times_) times_->note_motion(index < kTilt ? WireDevice::kRobot : WireDevice::kTable, now_s_);
@@ -73,8 +73,8 @@ void TrueCell::begin_motion(int index, double target, double speed_max, double a
   axis.off_since_s = kNever;
 }
 
-void TrueCell::brake_axis(int index) {
-  Axis& axis = axes_[static_cast<std::size_t>(index)];
+void TrueCell::brake_axis(std::size_t index) {
+  Axis& axis = axes_[index];
   if (axis.is_jammed || now_s_ >= axis.rest_s) {
     axis.target = axis.motion.target();
     return;
@@ -90,8 +90,8 @@ double TrueCell::drift(const Axis& axis) const {
   return axis.drifted + axis.drift_speed * (now_s_ - axis.drift_from_s);
 }
 
-double TrueCell::position(int index) const {
-  const Axis& axis = axes_[static_cast<std::size_t>(index)];
+double TrueCell::position(std::size_t index) const {
+  const Axis& axis = axes_[index];
   double creep = 0;
   if (now_s_ >= axis.rest_s && now_s_ < axis.settled_s) {
     constexpr double kDecay = 9;  // to a ten-thousandth at the end
@@ -100,47 +100,47 @@ double TrueCell::position(int index) const {
   return axis.motion.position(now_s_) + creep + drift(axis);
 }
 
-double TrueCell::profile(int index) const {
-  return axes_[static_cast<std::size_t>(index)].motion.position(now_s_);
+double TrueCell::profile(std::size_t index) const {
+  return axes_[index].motion.position(now_s_);
 }
 
-double TrueCell::speed(int index) const {
-  const Axis& axis = axes_[static_cast<std::size_t>(index)];
+double TrueCell::speed(std::size_t index) const {
+  const Axis& axis = axes_[index];
   return axis.motion.speed(now_s_) + axis.drift_speed;
 }
 
-bool TrueCell::is_moving(int index) const {
-  const Axis& axis = axes_[static_cast<std::size_t>(index)];
+bool TrueCell::is_moving(std::size_t index) const {
+  const Axis& axis = axes_[index];
   return now_s_ < axis.rest_s || (axis.is_jammed && axis.target != axis.motion.target());
 }
 
-bool TrueCell::is_settled(int index) const {
+bool TrueCell::is_settled(std::size_t index) const {
   constexpr double kRoundingS = 1e-9;
-  const Axis& axis = axes_[static_cast<std::size_t>(index)];
+  const Axis& axis = axes_[index];
   return !is_moving(index) && now_s_ >= axis.settled_s - kRoundingS && now_s_ < axis.off_since_s + options_.notice_s;
 }
 
 bool TrueCell::is_settled() const {
-  for (int i = 0; i < kAxisCount; ++i)
+  for (std::size_t i = 0; i < kAxisCount; ++i)
     if (!is_settled(i)) return false;
   return true;
 }
 
 Joints TrueCell::joints() const {
   Joints joints;
-  for (int i = 0; i < kAxisCount; ++i) joints[static_cast<std::size_t>(i)] = position(i);
+  for (std::size_t i = 0; i < kAxisCount; ++i) joints[i] = position(i);
   return joints;
 }
 
 CellPhase TrueCell::phase() const {
   if (is_emitting()) return CellPhase::kPulse;
-  for (int i = 0; i < kAxisCount; ++i)
+  for (std::size_t i = 0; i < kAxisCount; ++i)
     if (is_moving(i)) return CellPhase::kMoving;
   return is_settled() ? CellPhase::kSettled : CellPhase::kSettling;
 }
 
-void TrueCell::jam_axis(int index) {
-  Axis& axis = axes_[static_cast<std::size_t>(index)];
+void TrueCell::jam_axis(std::size_t index) {
+  Axis& axis = axes_[index];
   const double here = axis.motion.position(now_s_);
   if (now_s_ < axis.rest_s) {
     axis.motion = AxisMotion(here);
@@ -150,24 +150,24 @@ void TrueCell::jam_axis(int index) {
   axis.is_jammed = true;
 }
 
-void TrueCell::free_axis(int index) {
-  Axis& axis = axes_[static_cast<std::size_t>(index)];
+void TrueCell::free_axis(std::size_t index) {
+  Axis& axis = axes_[index];
   axis.is_jammed = false;
   axis.target = axis.motion.target();
 }
 
-void TrueCell::drift_axis(int index, double speed) {
-  Axis& axis = axes_[static_cast<std::size_t>(index)];
+void TrueCell::drift_axis(std::size_t index, double speed) {
+  Axis& axis = axes_[index];
   axis.drifted = drift(axis);
   axis.drift_from_s = now_s_;
   axis.drift_speed = speed;
 }
 
-void TrueCell::displace_axis(int index, double position) {
+void TrueCell::displace_axis(std::size_t index, double position) {
   Axis axis;
   axis.motion = AxisMotion(position);
   axis.target = position;
-  axes_[static_cast<std::size_t>(index)] = axis;
+  axes_[index] = axis;
 }
 
 void TrueCell::note_off(Axis& axis) {

@@ -44,27 +44,27 @@ class TrueCell {
   double next_event_s() const;
 
   // Axes. `scale` of speed and acceleration: 0..1.
-  void move_axis(int axis, double target, double speed_max, double acceleration);
-  void move_axis(int axis, double target, double speed_scale = 1);
-  void brake_axis(int axis);
-  double position(int axis) const;  ///< true
-  double speed(int axis) const;
-  double profile(int axis) const;  ///< what the axis's controller commands at present
-  double target(int axis) const { return axes_[static_cast<std::size_t>(axis)].target; }
-  bool is_moving(int axis) const;   ///< on its profile, or held by a jam short of its target
-  bool is_settled(int axis) const;  ///< at rest, rung down, where it was sent
-  double rest_s(int axis) const { return axes_[static_cast<std::size_t>(axis)].rest_s; }
-  double settled_s(int axis) const { return axes_[static_cast<std::size_t>(axis)].settled_s; }
+  void move_axis(std::size_t axis, double target, double speed_max, double acceleration);
+  void move_axis(std::size_t axis, double target, double speed_scale = 1);
+  void brake_axis(std::size_t axis);
+  double position(std::size_t axis) const;  ///< true
+  double speed(std::size_t axis) const;
+  double profile(std::size_t axis) const;  ///< what the axis's controller commands at present
+  double target(std::size_t axis) const { return axes_[axis].target; }
+  bool is_moving(std::size_t axis) const;   ///< on its profile, or held by a jam short of its target
+  bool is_settled(std::size_t axis) const;  ///< at rest, rung down, where it was sent
+  double rest_s(std::size_t axis) const { return axes_[axis].rest_s; }
+  double settled_s(std::size_t axis) const { return axes_[axis].settled_s; }
   Joints joints() const;
   bool is_settled() const;
   CellPhase phase() const;
-  const AxisDescription& limits(int axis) const { return description_.axes[static_cast<std::size_t>(axis)]; }
+  const AxisDescription& limits(std::size_t axis) const { return description_.axes[axis]; }
 
   // Faults of the mechanics.
-  void jam_axis(int axis);                        ///< stops at once, and stays until free_axis()
-  void free_axis(int axis);                       ///< it remains where it is; the next order moves it
-  void drift_axis(int axis, double speed);        ///< leaves its place at this speed; 0 ends it
-  void displace_axis(int axis, double position);  ///< where it stands when power comes on
+  void jam_axis(std::size_t axis);                        ///< stops at once, and stays until free_axis()
+  void free_axis(std::size_t axis);                       ///< it remains where it is; the next order moves it
+  void drift_axis(std::size_t axis, double speed);        ///< leaves its place at this speed; 0 ends it
+  void displace_axis(std::size_t axis, double position);  ///< where it stands when power comes on
 
   // The laser head.
   /// Light while emission is on; or only while the wired gate input, or the gate of the serial line, is open as well.
@@ -111,7 +111,7 @@ class TrueCell {
     bool is_jammed = false;
   };
   double drift(const Axis& axis) const;
-  void begin_motion(int axis, double target, double speed_max, double acceleration, double share);
+  void begin_motion(std::size_t axis, double target, double speed_max, double acceleration, double share);
   void note_off(Axis& axis);
   bool may_emit() const;
   void update_light();

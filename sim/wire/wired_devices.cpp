@@ -28,7 +28,7 @@ WiredDevices::WiredDevices(const CellDescription& description, const WireOptions
       robot_(cell_, faults_, times_) {
   cell_.set_time_record(&times_);
   const double steps_per_rad = options.steps_per_deg * 180 / std::numbers::pi;
-  for (const int axis : {kTilt, kRotation})
+  for (const std::size_t axis : {kTilt, kRotation})
     banks_.push_back(make_bank(options.table, DriveAxis(axis, steps_per_rad, cell_, faults_, times_)));
   faults_.set_alarm([this](WireDevice device) {
     constexpr int kOverload = 0x30;

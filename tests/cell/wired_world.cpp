@@ -117,10 +117,7 @@ ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsign
       program.vias.push_back({static_cast<std::uint32_t>(i), at});
       at[kJ3] = .2;
     }
-    for (const int axis : {kJ1, kJ2, kJ4}) {
-      const auto k = static_cast<std::size_t>(axis);
-      at[k] = std::clamp(at[k] + step(random), home[k] - .2, home[k] + .2);
-    }
+    for (const std::size_t k : {kJ1, kJ2, kJ4}) at[k] = std::clamp(at[k] + step(random), home[k] - .2, home[k] + .2);
     at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .15, .21);
     program.exposures.push_back(small_exposure(i, at));
   }

@@ -15,7 +15,7 @@ class EmissionRecord : public ::testing::Test {
  protected:
   static Emission emission(int i) {
     Emission e;
-    for (int k = 0; k < kAxisCount; ++k) e.joints[k] = i + .1 * k;
+    for (std::size_t k = 0; k < kAxisCount; ++k) e.joints[k] = i + .1 * static_cast<double>(k);
     e.start_s = 10. * i, e.length_s = .004, e.commanded_s = .005, e.power_w = 1.5 + i, e.is_moving = i % 2 == 1;
     return e;
   }

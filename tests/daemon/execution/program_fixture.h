@@ -69,8 +69,7 @@ inline ExposureProgram small_program(std::size_t count, unsigned seed = 1) {
       program.vias.push_back({static_cast<std::uint32_t>(i), at});
       at[kJ3] = .1;
     }
-    for (int axis : {kJ1, kJ2, kJ4})
-      at[static_cast<std::size_t>(axis)] = std::clamp(at[static_cast<std::size_t>(axis)] + step(random), -1.5, 1.5);
+    for (const std::size_t axis : {kJ1, kJ2, kJ4}) at[axis] = std::clamp(at[axis] + step(random), -1.5, 1.5);
     at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .05, .14);
     program.exposures.push_back(small_exposure(i, at));
   }

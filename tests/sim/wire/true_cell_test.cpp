@@ -29,10 +29,8 @@ TEST(TrueCell, AnAxisTakesTheTimeOfTheTimeModelAndSettles) {
     bench.cell.move_axis(kJ1, to);
     const auto& axis = description.axes[kJ1];
     const double rest_s = trapezoid_s(std::abs(to - from), axis.speed_max, axis.acceleration_max);
-    Joints a{}, b{};
-    for (int i = 0; i < kAxisCount; ++i)
-      a[static_cast<std::size_t>(i)] = b[static_cast<std::size_t>(i)] =
-          description.axes[static_cast<std::size_t>(i)].home;
+    const Joints a = home_joints(description);
+    Joints b = a;
     b[kJ1] = to;
     EXPECT_NEAR(bench.cell.rest_s(kJ1), rest_s, 1e-9);
     EXPECT_NEAR(bench.cell.settled_s(kJ1), rest_s + settle_s(description, a, b), 1e-9);
