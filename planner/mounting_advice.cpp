@@ -1,11 +1,11 @@
 #include "planner/mounting_advice.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <random>
 
 #include "planner/mounting.h"
@@ -21,7 +21,7 @@ constexpr double kHeightFactors[] = {.5};
 constexpr double kHeightStepsM[] = {.02, .04, .08};
 
 bool depends_on_mounting(const SkippedDot& skipped) {
-  return skipped.reason != SkipReason::kEnergy && skipped.reason != SkipReason::kNoWay;
+  return skipped.reason != SkipReason::kEnergy && skipped.reason != SkipReason::kNoPath;
 }
 
 /// `count` of `all`, evenly with a random start.
@@ -68,8 +68,8 @@ Eigen::Isometry3d lay_over(const TexturedMesh& mesh, const Standing& standing) {
   return mount * Translation3d(-box.center().x(), -box.center().y(), -box.min().z()) * over;
 }
 
-double share_reached(const Reach::Implementation& reach, const DotSequence& dots,
-                     const std::vector<std::uint32_t>& indices, const Eigen::Isometry3d& moved) {
+double share_reached(const Reach& reach, const DotSequence& dots, const std::vector<std::uint32_t>& indices,
+                     const Eigen::Isometry3d& moved) {
   if (indices.empty()) return 1;
   const Joints reference{};
   std::vector<std::uint8_t> is_reached(indices.size());
@@ -95,7 +95,7 @@ std::optional<MountingAdvice> advise_mounting(const TexturedMesh& mesh, const Ce
   std::optional<MountingAdvice> best;
   const auto consider = [&](MountingAdvice advice, const TexturedMesh& trial_mesh, const CellDescription& trial_cell,
                             const Eigen::Isometry3d& moved) {
-    const Reach::Implementation reach(trial_mesh, trial_cell, options);
+    const Reach reach(trial_mesh, trial_cell, options);
     const double helped = share_reached(reach, dots, chosen.skipped, moved);
     if (helped < kMinHelped) return;
     const double lost = 1 - share_reached(reach, dots, chosen.reached, moved);
@@ -126,16 +126,15 @@ std::optional<MountingAdvice> advise_mounting(const TexturedMesh& mesh, const Ce
 }
 
 std::string advice_sentence(const MountingAdvice& advice) {
-  char change[80], text[240];
-  if (advice.post_height_m)
-    std::snprintf(change, sizeof change, "a post of %.0f mm (--post-height-mm %.0f)", *advice.post_height_m * 1e3,
-                  *advice.post_height_m * 1e3);
-  else
-    std::snprintf(change, sizeof change, "the object standing on its %s axis (--up %s)",
-                  advice.up == UpAxis::kY ? "y" : "z", advice.up == UpAxis::kY ? "y" : "z");
-  std::snprintf(text, sizeof text, "%s would reach about %.1f %% of the dots instead of %.1f %%", change,
-                100 * advice.reached_then, 100 * advice.reached_now);
-  return text;
+  std::string change;
+  if (advice.post_height_m) {
+    change = fmt::format("a post of {0:.0f} mm (--post-height-mm {0:.0f})", *advice.post_height_m * 1e3);
+  } else {
+    const char* const axis = advice.up == UpAxis::kY ? "y" : "z";
+    change = fmt::format("the object standing on its {0} axis (--up {0})", axis);
+  }
+  return fmt::format("{} would reach about {:.1f} % of the dots instead of {:.1f} %", change, 100 * advice.reached_then,
+                     100 * advice.reached_now);
 }
 
 }  // namespace hilbrush

@@ -4,8 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "planner/cell_model/cell_description.h"
 #include "planner/cell_model/mounting_options.h"
-#include "planner/plan.h"
+#include "planner/cell_model/plan_options.h"
+#include "planner/reach/skipped_dot.h"
+#include "sampling/dots/dots.h"
 #include "sampling/model/model_file.h"
 
 /// What an operator could change about the mounting so that more dots are reached.
@@ -14,7 +17,7 @@ namespace hilbrush {
 struct MountingAdvice {
   std::optional<double> post_height_m;  ///< a post this high; or
   std::optional<UpAxis> up;             ///< the object standing on this axis
-  double reached_now = 0;               ///< shares of all dots; poses only, not the ways between them
+  double reached_now = 0;               ///< shares of all dots; poses only, not the paths between them
   double reached_then = 0;              ///< ... estimated
 };
 

@@ -3,13 +3,13 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <limits>
 #include <system_error>
 
 #include "sampling/base/sha256.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
@@ -45,14 +45,12 @@ struct Header {
 
 /// The header's part that the hash covers: all after the hash's own line.
 std::string header_text(const Header& header) {
-  char pitch[40];
-  std::snprintf(pitch, sizeof pitch, "%.17g", header.pitch_m);
   std::string text;
   text += "comment model_sha256 " + header.provenance.model_sha256 + '\n';
   text += "comment settings_sha256 " + header.provenance.settings_sha256 + '\n';
   text += "comment cell_sha256 " + header.provenance.cell_sha256 + '\n';
   text += "comment version " + header.provenance.version + '\n';
-  text += std::string("comment pitch_m ") + pitch + '\n';
+  text += "comment pitch_m " + number(header.pitch_m, 17) + '\n';
   text += "element vertex " + std::to_string(header.exposure_count) + '\n';
   text += kExposureProperties;
   text += "element via " + std::to_string(header.via_count) + '\n';

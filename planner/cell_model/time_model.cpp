@@ -32,4 +32,8 @@ double settle_s(const CellDescription& cell, const Joints& from, const Joints& t
   return timing.settle_min_s + (timing.settle_max_s - timing.settle_min_s) * std::min(1., share);
 }
 
+double step_s(const CellDescription& cell, const Joints& from, const Joints& to) {
+  return move_s(cell, from, to) + settle_s(cell, from, to);
+}
+
 }  // namespace hilbrush

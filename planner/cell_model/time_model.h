@@ -10,5 +10,7 @@ double trapezoid_s(double distance, double speed_max, double acceleration_max);
 /// Slowest axis by what was measured of it, rounded up to whole control ticks.
 double move_s(const CellDescription& cell, const Joints& from, const Joints& to);
 double settle_s(const CellDescription& cell, const Joints& from, const Joints& to);
+/// Move and settle of a direct move between two exposures.
+double step_s(const CellDescription& cell, const Joints& from, const Joints& to);
 
 }  // namespace hilbrush

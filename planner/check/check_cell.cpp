@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <numbers>
 
+#include "sampling/base/angles.h"
 #include "sampling/base/check.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
@@ -17,9 +18,7 @@ constexpr std::size_t kWitnesses = 48;
 constexpr double kMillimeter = 1e-3;
 
 std::string millimeters(double length_m) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g mm", length_m / kMillimeter);
-  return text;
+  return number(length_m / kMillimeter, 3) + " mm";
 }
 
 }  // namespace
@@ -165,7 +164,7 @@ bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_
   std::array<Eigen::Vector3d, kBundleRays> from_O, along_O;
   along_O.fill(X_OB.linear() * body.axis_F);
   for (std::size_t i = 0; i < kBundleRays; ++i) {
-    const double angle = 2 * std::numbers::pi * static_cast<double>(i) / kRimRays;
+    const double angle = kTurn * static_cast<double>(i) / kRimRays;
     Eigen::Vector3d from_F = body.from_F;
     if (i < kRimRays) from_F += body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
     from_O[i] = X_OB * from_F;
@@ -191,7 +190,7 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
   };
   constexpr int kRimPoints = 36, kMantleLines = 12, kAxisPoints = 20;
   for (int i = 0; i < kRimPoints; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kRimPoints, r = cell_.table.plate_radius_m;
+    const double angle = kTurn * i / kRimPoints, r = cell_.table.plate_radius_m;
     const Eigen::Vector3d rim(r * std::cos(angle), r * std::sin(angle), -post);
     if (is_in_body(rim) || is_in_body(rim - thickness * Eigen::Vector3d::UnitZ())) return true;
   }
@@ -199,7 +198,7 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
     if (is_in_body({0, 0, -post * i / kAxisPoints})) return true;
   const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
   for (int i = 0; i < kMantleLines; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kMantleLines;
+    const double angle = kTurn * i / kMantleLines;
     const Eigen::Vector3d rim_O = from_O + body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
     for (int k = 0; k <= kAxisPoints; ++k)
       if (is_in_table(rim_O + (body.length_m * k / kAxisPoints) * axis_O)) return true;

@@ -1,11 +1,10 @@
 #include "planner/check/program_check.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include "planner/check/check_cell.h"
 #include "sampling/base/angles.h"
@@ -18,23 +17,10 @@ constexpr double kLandingToleranceM = 10e-6;
 constexpr double kJointTolerance = 1e-9;
 constexpr double kIncidenceTolerance = 1e-5;  // rad: normals and incidences are kept in single precision
 constexpr double kEnergyTolerance = 1e-5;     // relative, for the same reason
-constexpr double kLookM = 3e-3;               // along moves, clearance is looked at this often
+constexpr double kCheckStepM = 3e-3;          // along moves, between two checks of the clearance
 constexpr std::size_t kCheckBlock = 512;
 
 using Faults = std::vector<ProgramFault>;
-
-__attribute__((format(printf, 1, 2))) std::string sentence(const char* format, ...) {
-  char text[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
-
-const char* axis_name(int axis) {
-  return kAxisNames[static_cast<std::size_t>(axis)];
-}
 
 /// Where an axis is `time_s` into a move over `distance`: the second half is the first one backwards.
 double axis_position(double distance, double time_s, const AxisDescription& axis) {
@@ -62,22 +48,17 @@ class ProgramCheck {
   void check_vias(Faults& faults) const;
   void check_provenance(const Provenance& made_from, Faults& faults) const;
   void check_exposure(std::size_t i, Faults& faults) const;
-  /// The way from exposure i - 1 (or home) to exposure i (or home, if i is the count).
-  void check_way(std::size_t i, Faults& faults) const;
+  /// The path from exposure i - 1 (or home) to exposure i (or home, if i is the count).
+  void check_path(std::size_t i, Faults& faults) const;
 
  private:
-  bool is_inside(int axis, double value) const;
+  bool is_inside(std::size_t axis, double value) const;
   bool is_inside(const Joints& joints) const;
   void check_limits(const Joints& joints, std::size_t i, Faults& faults) const;
   void check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Faults& faults) const;
   void check_dose(std::size_t i, Faults& faults) const;
   void check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
   void check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
-  Joints home() const {
-    Joints joints;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) joints[axis] = cell_.axes[axis].home;
-    return joints;
-  }
 
   const ExposureProgram& program_;
   const DotSequence& dots_;
@@ -88,72 +69,73 @@ class ProgramCheck {
 
 void ProgramCheck::check_counts(const std::vector<SkippedDot>& skipped, Faults& faults) const {
   std::vector<std::uint8_t> seen(dots_.dots.size(), 0);
-  const auto see = [&](std::uint32_t dot, std::size_t exposure, const char* where) {
+  const auto count = [&](std::uint32_t dot, std::size_t exposure, const char* where) {
     if (dot >= seen.size())
-      faults.push_back({sentence("dot %u, %s, is none of the %zu dots", dot, where, seen.size()), exposure});
+      faults.push_back({fmt::format("dot {}, {}, is not one of the {} dots", dot, where, seen.size()), exposure});
     else if (seen[dot]++)
-      faults.push_back({sentence("dot %u, %s, occurs more than once", dot, where), exposure});
+      faults.push_back({fmt::format("dot {}, {}, occurs more than once", dot, where), exposure});
   };
-  for (std::size_t i = 0; i < program_.exposures.size(); ++i) see(program_.exposures[i].dot_index, i, "exposed");
+  for (std::size_t i = 0; i < program_.exposures.size(); ++i) count(program_.exposures[i].dot_index, i, "exposed");
   for (const auto& s : skipped) {
-    see(s.dot_index, program_.exposures.size(), "skipped");
+    count(s.dot_index, program_.exposures.size(), "skipped");
     if (s.detail.empty())
-      faults.push_back({sentence("dot %u is skipped without a reason", s.dot_index), program_.exposures.size()});
+      faults.push_back({fmt::format("dot {} is skipped without a reason", s.dot_index), program_.exposures.size()});
   }
   const auto missing = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), 0));
   if (missing > 0)
-    faults.push_back({sentence("%zu dots are neither exposed nor skipped", missing), program_.exposures.size()});
+    faults.push_back({fmt::format("{} dots are neither exposed nor skipped", missing), program_.exposures.size()});
   if (!(program_.pitch_m > 0) || std::abs(program_.pitch_m - dots_.pitch_m) > 1e-12)
-    faults.push_back({sentence("the pitch is %g m, the dots' %g m", program_.pitch_m, dots_.pitch_m), 0});
+    faults.push_back({fmt::format("the pitch is {:.6g} m, the dots' {:.6g} m", program_.pitch_m, dots_.pitch_m), 0});
 }
 
 void ProgramCheck::check_vias(Faults& faults) const {
   std::size_t previous = 0;
   for (const Via& via : program_.vias) {
     if (via.before_exposure < previous || via.before_exposure > program_.exposures.size())
-      faults.push_back({sentence("a way-point before exposure %u is out of order", via.before_exposure), previous});
+      faults.push_back({fmt::format("a way-point before exposure {} is out of order", via.before_exposure), previous});
     previous = via.before_exposure;
     check_limits(via.joints, via.before_exposure, faults);
   }
-  if (program_.vias.empty() || program_.vias.front().before_exposure != 0 || program_.vias.front().joints != home())
+  if (program_.vias.empty() || program_.vias.front().before_exposure != 0 ||
+      program_.vias.front().joints != home_joints(cell_))
     faults.push_back({"the program does not start at home", 0});
   if (program_.vias.empty() || program_.vias.back().before_exposure != program_.exposures.size() ||
-      program_.vias.back().joints != home())
+      program_.vias.back().joints != home_joints(cell_))
     faults.push_back({"the program does not end at home", program_.exposures.size()});
 }
 
 void ProgramCheck::check_provenance(const Provenance& made_from, Faults& faults) const {
-  const auto compare = [&](const std::string& said, const std::string& expected, const char* what) {
-    if (said != expected) faults.push_back({sentence("the program says it was made from another %s", what), 0});
+  const auto compare = [&](const std::string& stated, const std::string& expected, const char* what) {
+    if (stated != expected) faults.push_back({fmt::format("the program was made from another {}", what), 0});
   };
-  const Provenance& said = program_.provenance;
-  compare(said.model_sha256, made_from.model_sha256, "model");
-  compare(said.settings_sha256, made_from.settings_sha256, "job's settings");
-  compare(said.cell_sha256, made_from.cell_sha256, "cell");
-  compare(said.version, made_from.version, "version of this program");
+  const Provenance& stated = program_.provenance;
+  compare(stated.model_sha256, made_from.model_sha256, "model");
+  compare(stated.settings_sha256, made_from.settings_sha256, "job's settings");
+  compare(stated.cell_sha256, made_from.cell_sha256, "cell");
+  compare(stated.version, made_from.version, "version of this program");
 }
 
 /// The comparison is such that NaN fails it.
-bool ProgramCheck::is_inside(int axis, double value) const {
-  const auto& limits = cell_.axes[static_cast<std::size_t>(axis)];
+bool ProgramCheck::is_inside(std::size_t axis, double value) const {
+  const auto& limits = cell_.axes[axis];
   return value >= limits.min - kJointTolerance && value <= limits.max + kJointTolerance;
 }
 
 bool ProgramCheck::is_inside(const Joints& joints) const {
-  for (int axis = 0; axis < kAxisCount; ++axis)
-    if (!is_inside(axis, joints[static_cast<std::size_t>(axis)])) return false;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (!is_inside(axis, joints[axis])) return false;
   return true;
 }
 
 void ProgramCheck::check_limits(const Joints& joints, std::size_t i, Faults& faults) const {
-  for (int axis = 0; axis < kAxisCount; ++axis) {
-    const auto& limits = cell_.axes[static_cast<std::size_t>(axis)];
-    const double value = joints[static_cast<std::size_t>(axis)];
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const auto& limits = cell_.axes[axis];
+    const double value = joints[axis];
     if (is_inside(axis, value)) continue;
     const bool is_length = axis == kJ3;
     const double unit = is_length ? 1e-3 : kDegree;
-    faults.push_back({sentence("%s at %.6g %s is outside %.6g to %.6g", axis_name(axis), value / unit,
-                               is_length ? "mm" : "degrees", limits.min / unit, limits.max / unit),
+    faults.push_back({fmt::format("{} at {:.6g} {} is outside {:.6g} to {:.6g}", kAxisNames[axis], value / unit,
+                                  is_length ? "mm" : "degrees", limits.min / unit, limits.max / unit),
                       i});
   }
 }
@@ -163,20 +145,21 @@ void ProgramCheck::check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Fault
   if (exposure.dot_index >= dots_.dots.size()) return;  // counted already
   const Dot& dot = dots_.dots[exposure.dot_index];
   if (exposure.position_O != dot.position_O || exposure.normal_O != dot.normal_O || exposure.tone != dot.tone)
-    faults.push_back({sentence("place, normal or tone is not that of dot %u", exposure.dot_index), i});
+    faults.push_back({fmt::format("position, normal or tone differs from that of dot {}", exposure.dot_index), i});
 
   const double off_m = (check_cell_.focus_O(X_OF) - dot.position_O).norm();
-  if (!(off_m <= kFocusToleranceM)) faults.push_back({sentence("the focus is %.3g mm off the dot", off_m * 1e3), i});
+  if (!(off_m <= kFocusToleranceM))
+    faults.push_back({fmt::format("the focus is {:.3g} mm off the dot", off_m * 1e3), i});
   const double cosine = -check_cell_.beam_O(X_OF).dot(dot.normal_O.cast<double>().normalized());
   const double incidence = std::acos(std::clamp(cosine, -1., 1.));
   if (!(incidence <= options_.max_incidence + kIncidenceTolerance))
-    faults.push_back({sentence("the beam meets the face at %.3f degrees, more than %.3f", incidence / kDegree,
-                               options_.max_incidence / kDegree),
+    faults.push_back({fmt::format("the beam meets the face at {:.3f} degrees, more than {:.3f}", incidence / kDegree,
+                                  options_.max_incidence / kDegree),
                       i});
   // acos is steep near 0: compare cosines.
   if (!(std::abs(std::cos(static_cast<double>(exposure.incidence)) - cosine) <= kIncidenceTolerance))
-    faults.push_back({sentence("the incidence is said to be %.3f degrees and is %.3f",
-                               static_cast<double>(exposure.incidence) / kDegree, incidence / kDegree),
+    faults.push_back({fmt::format("the incidence is stated as {:.3f} degrees and is {:.3f}",
+                                  static_cast<double>(exposure.incidence) / kDegree, incidence / kDegree),
                       i});
 }
 
@@ -188,15 +171,15 @@ void ProgramCheck::check_dose(std::size_t i, Faults& faults) const {
     return value >= low * (1 - kEnergyTolerance) && value <= high * (1 + kEnergyTolerance);
   };
   if (!within(power, laser.power_min_w, laser.power_max_w))
-    faults.push_back({sentence("%g W is outside the laser's limits", power), i});
+    faults.push_back({fmt::format("{:.6g} W is outside the laser's limits", power), i});
   if (!within(pulse, laser.pulse_min_s, laser.pulse_max_s))
-    faults.push_back({sentence("a pulse of %g s is outside the laser's limits", pulse), i});
+    faults.push_back({fmt::format("a pulse of {:.6g} s is outside the laser's limits", pulse), i});
   if (!within(energy, power * pulse, power * pulse))
-    faults.push_back({sentence("%g J is not %g W for %g s", energy, power, pulse), i});
+    faults.push_back({fmt::format("{:.6g} J is not {:.6g} W for {:.6g} s", energy, power, pulse), i});
   if (exposure.dot_index >= dots_.dots.size()) return;
   const double wanted = dots_.dots[exposure.dot_index].level * full_energy_j(cell_, dots_.pitch_m);
   if (!within(energy, wanted, wanted))
-    faults.push_back({sentence("%g J is not the %g J that the dot's level asks for", energy, wanted), i});
+    faults.push_back({fmt::format("{:.6g} J is not the {:.6g} J that the dot's level asks for", energy, wanted), i});
 }
 
 void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
@@ -210,14 +193,15 @@ void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
   if (auto fault = check_cell_.body_fault(joints); !fault.empty()) faults.push_back({fault, i});
 }
 
-/// What may only happen with the tool drawn back, on no leg that begins or ends at a dot: the elbow going over, half a
-/// turn of J4 or C at once.
+/// What may only happen with the tool retracted, never on a leg that begins or ends at a dot: an elbow flip, more than
+/// half a turn of J4 or C at once.
 void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
   if (from[kJ2] * to[kJ2] < 0) faults.push_back({"the elbow flips without a retract", i});
-  for (const int axis : {kJ4, kRotation}) {
-    const double turn = std::abs(to[static_cast<std::size_t>(axis)] - from[static_cast<std::size_t>(axis)]);
+  for (const std::size_t axis : {kJ4, kRotation}) {
+    const double turn = std::abs(to[axis] - from[axis]);
     if (!(turn <= 200 * kDegree))
-      faults.push_back({sentence("%s turns by %.0f degrees without a retract", axis_name(axis), turn / kDegree), i});
+      faults.push_back(
+          {fmt::format("{} turns by {:.0f} degrees without a retract", kAxisNames[axis], turn / kDegree), i});
   }
 }
 
@@ -231,12 +215,12 @@ void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i
   }
   const Eigen::Isometry3d X_from = check_cell_.X_OF(from), X_to = check_cell_.X_OF(to);
   const double travel_m = check_cell_.travel_m(X_from, X_to);
-  if (travel_m < kLookM && sweep_m < 4 * kLookM) return;  // both ends are looked at as poses
-  const int look_count = static_cast<int>(std::ceil(std::max(travel_m, sweep_m) / kLookM));
-  for (int k = 1; k <= look_count; ++k) {
+  if (travel_m < kCheckStepM && sweep_m < 4 * kCheckStepM) return;  // both ends are checked as poses
+  const int step_count = static_cast<int>(std::ceil(std::max(travel_m, sweep_m) / kCheckStepM));
+  for (int k = 1; k <= step_count; ++k) {
     Joints now = to;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      now[axis] = from[axis] + std::copysign(axis_position(std::abs(to[axis] - from[axis]), end_s * k / look_count,
+      now[axis] = from[axis] + std::copysign(axis_position(std::abs(to[axis] - from[axis]), end_s * k / step_count,
                                                            cell_.axes[axis]),
                                              to[axis] - from[axis]);
     const std::string fault = check_cell_.body_fault(now);
@@ -246,17 +230,17 @@ void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i
   }
 }
 
-void ProgramCheck::check_way(std::size_t i, Faults& faults) const {
-  // Joints outside their limits have been reported; no way leads to or from them.
+void ProgramCheck::check_path(std::size_t i, Faults& faults) const {
+  // Joints outside their limits have been reported; no path leads to or from them.
   if (i > 0 && !is_inside(program_.exposures[i - 1].joints)) return;
   if (i < program_.exposures.size() && !is_inside(program_.exposures[i].joints)) return;
-  std::vector<Joints> way{i == 0 ? home() : program_.exposures[i - 1].joints};
-  for (const Via& via : program_.vias_before(i)) way.push_back(via.joints);
-  if (i < program_.exposures.size()) way.push_back(program_.exposures[i].joints);
-  for (std::size_t leg = 1; leg < way.size(); ++leg) {
-    const bool leaves_dot = leg == 1 && i > 0, meets_dot = leg + 1 == way.size() && i < program_.exposures.size();
-    if (leaves_dot || meets_dot) check_leg_at_dot(way[leg - 1], way[leg], i, faults);
-    check_leg(way[leg - 1], way[leg], i, faults);
+  std::vector<Joints> path{i == 0 ? home_joints(cell_) : program_.exposures[i - 1].joints};
+  for (const Via& via : program_.vias_before(i)) path.push_back(via.joints);
+  if (i < program_.exposures.size()) path.push_back(program_.exposures[i].joints);
+  for (std::size_t leg = 1; leg < path.size(); ++leg) {
+    const bool leaves_dot = leg == 1 && i > 0, meets_dot = leg + 1 == path.size() && i < program_.exposures.size();
+    if (leaves_dot || meets_dot) check_leg_at_dot(path[leg - 1], path[leg], i, faults);
+    check_leg(path[leg - 1], path[leg], i, faults);
   }
 }
 
@@ -285,7 +269,7 @@ std::vector<ProgramFault> check_program(const ExposureProgram& program, const st
       const std::size_t begin = (first + b) * kCheckBlock, end = std::min(count, begin + kCheckBlock);
       for (std::size_t i = begin; i < end && found[b].size() < limit; ++i) {
         if (i < program.exposures.size()) check.check_exposure(i, found[b]);
-        check.check_way(i, found[b]);
+        check.check_path(i, found[b]);
       }
     });
     for (Faults& block : found) faults.insert(faults.end(), block.begin(), block.end());

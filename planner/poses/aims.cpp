@@ -9,6 +9,7 @@
 
 #include "planner/reach/beam_directions.h"
 #include "sampling/base/angles.h"
+#include "sampling/base/batches.h"
 
 namespace hilbrush {
 namespace {
@@ -49,7 +50,7 @@ class AimLocation {
     const std::size_t asked = std::min(dots_.size(), costs_.sample);
     weight_ = asked > 0 ? static_cast<double>(dots_.size()) / static_cast<double>(asked) : 0;
     served_.resize(asked);
-    const double cos_preferred = std::cos(kept_incidence(dots_.reach().options));
+    const double cos_preferred = std::cos(kept_incidence(dots_.reach().options()));
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, asked, 16), [&](const auto& range) {
       for (std::size_t s = range.begin(); s < range.end(); ++s) {
         const Target target = dots_.target(s * dots_.size() / asked);
@@ -152,7 +153,7 @@ class BlockOfAims {
   };
 
   void find_candidates(const Target& target) {
-    const double cos_preferred = std::cos(kept_incidence(dots_.reach().options));
+    const double cos_preferred = std::cos(kept_incidence(dots_.reach().options()));
     for (std::size_t k = 0; k < beams_O_.size(); ++k) {
       const double cosine = -beams_O_[k].dot(target.smooth_normal_O);
       if (cosine >= cos_preferred && dots_.reach().is_clear(target, beams_O_[k]))
@@ -238,14 +239,12 @@ Aims choose_aims(const AimedDots& dots, const AimCosts& costs, const Progress& p
   aims.beams_O = AimLocation(dots, costs).solve(progress.part(0, .5));
   aims.of_dot.assign(dots.size(), kNoAim);
   const std::size_t block_count = (dots.size() + kAimBlock - 1) / kAimBlock;
-  const Progress choice = progress.part(.5, 1);
-  for (std::size_t first = 0; first < block_count; first += kBlocksAtOnce) {
-    tbb::parallel_for(first, std::min(first + kBlocksAtOnce, block_count), [&](std::size_t b) {
+  for_batches(block_count, kBlocksAtOnce, progress.part(.5, 1), [&](std::size_t first, std::size_t last) {
+    tbb::parallel_for(first, last, [&](std::size_t b) {
       const std::size_t end = std::min(dots.size(), (b + 1) * kAimBlock);
       BlockOfAims(dots, costs, aims.beams_O).choose(b * kAimBlock, end, aims.of_dot.data());
     });
-    choice.step(std::min(first + kBlocksAtOnce, block_count), block_count);
-  }
+  });
   return aims;
 }
 

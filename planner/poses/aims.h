@@ -14,17 +14,17 @@ namespace hilbrush {
 /// The dots that poses are looked for, and what may be done to them. Thread-safe.
 class AimedDots {
  public:
-  AimedDots(const Reach::Implementation& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices)
+  AimedDots(const Reach& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices)
       : reach_(reach), dots_(dots), dot_indices_(dot_indices) {}
 
   std::size_t size() const { return dot_indices_.size(); }
   std::uint32_t dot_index(std::size_t i) const { return dot_indices_[i]; }
   Target target(std::size_t i) const { return target_of(dots_.dots[dot_indices_[i]]); }
   const Eigen::Vector3d& position_O(std::size_t i) const { return dots_.dots[dot_indices_[i]].position_O; }
-  const Reach::Implementation& reach() const { return reach_; }
+  const Reach& reach() const { return reach_; }
 
  private:
-  const Reach::Implementation& reach_;
+  const Reach& reach_;
   const DotSequence& dots_;
   std::span<const std::uint32_t> dot_indices_;
 };

@@ -10,7 +10,7 @@
 namespace hilbrush {
 
 /// Cost: a few dozen arm solutions a dot. One thread: each pose depends on the one before.
-PosedDots follow_normal(const Reach::Implementation& reach, const DotSequence& dots,
-                        std::span<const std::uint32_t> dot_indices, const Progress& progress = {});
+PosedDots follow_normal(const Reach& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices,
+                        const Progress& progress = {});
 
 }  // namespace hilbrush

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "planner/cell_model/time_model.h"
 #include "planner/poses/ordering.h"
 #include "planner/poses/stations.h"
 #include "planner/poses/unserved_dots.h"
 #include "planner/poses/yaw_redundancy.h"
+#include "sampling/base/angles.h"
+#include "sampling/base/batches.h"
 #include "sampling/base/check.h"
 
 namespace hilbrush {
@@ -42,17 +44,16 @@ void remove_misfits(const AimedDots& dots, std::vector<Tour>& tours, std::vector
 }
 
 /// C and J4 by the shortest way from the tour before. Returns where the axes stand at the tour's first dot.
-Joints unwrap_near(const Reach::Implementation& reach, const Eigen::Vector3d& first_O, const Joints& before,
-                   Station& station) {
-  station.rotation = reach.kinematics.unwrap_near(kRotation, station.rotation, before[kRotation]);
+Joints unwrap_near(const Reach& reach, const Eigen::Vector3d& first_O, const Joints& before, Station& station) {
+  station.rotation = reach.kinematics().unwrap_near(kRotation, station.rotation, before[kRotation]);
   // J4 keeps clear of its ends, so that it need not unwind within the tour.
-  const double middle = (reach.kinematics.axis_min(kJ4) + reach.kinematics.axis_max(kJ4)) / 2;
+  const double middle = (reach.kinematics().axis_min(kJ4) + reach.kinematics().axis_max(kJ4)) / 2;
   const double half =
-      std::max(std::numbers::pi, (reach.kinematics.axis_max(kJ4) - reach.kinematics.axis_min(kJ4)) / 2 - 1);
+      std::max(kTurn / 2, (reach.kinematics().axis_max(kJ4) - reach.kinematics().axis_min(kJ4)) / 2 - 1);
   auto joints = joints_at(reach, station, first_O, before);
   if (joints && std::abs((*joints)[kJ4] - middle) > half) {
     Joints reference = *joints;
-    reference[kJ4] -= std::copysign(2 * std::numbers::pi, reference[kJ4] - middle);
+    reference[kJ4] -= std::copysign(kTurn, reference[kJ4] - middle);
     joints = joints_at(reach, station, first_O, reference);
   }
   return joints ? *joints : before;
@@ -60,7 +61,7 @@ Joints unwrap_near(const Reach::Implementation& reach, const Eigen::Vector3d& fi
 
 /// The tour's dots with their joints, in the order in which they are exposed.
 std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, Tour& tour, const Joints& first) {
-  const Reach::Implementation& reach = dots.reach();
+  const Reach& reach = dots.reach();
   std::vector<Joints> joints;
   joints.reserve(tour.dots.size());
   for (const std::uint32_t dot : tour.dots) {
@@ -68,14 +69,14 @@ std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, T
     CHECK(found.has_value());  // misfits have been removed
     joints.push_back(*found);
   }
-  if (reach.options.order == DotOrder::kImproved) {
+  if (reach.options().order == DotOrder::kImproved) {
     std::vector<PathDot> path;
     path.reserve(joints.size());
     for (std::size_t i = 0; i < joints.size(); ++i) {
       path.push_back({dots.position_O(tour.dots[i]).cast<float>(), arm_of(joints[i]),
-                      arm_of(reach.kinematics.per_yaw(joints[i]))});
+                      arm_of(reach.kinematics().per_yaw(joints[i]))});
     }
-    const std::vector<std::uint32_t> order = improved_order(reach.cell, path, costs.kicks);
+    const std::vector<std::uint32_t> order = improved_order(reach.cell(), path, costs.kicks);
     const std::vector<Joints> old_joints = joints;
     const std::vector<std::uint32_t> old_dots = tour.dots;
     for (std::size_t i = 0; i < order.size(); ++i) {
@@ -92,12 +93,12 @@ std::vector<PosedDot> posed_tour(const AimedDots& dots, const AimCosts& costs, T
 
 }  // namespace
 
-PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& dots,
-                       std::span<const std::uint32_t> dot_indices, const Progress& progress) {
+PosedDots search_poses(const Reach& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices,
+                       const Progress& progress) {
   const AimedDots aimed(reach, dots, dot_indices);
-  AimCosts costs = aim_costs(reach.options);
+  AimCosts costs = aim_costs(reach.options());
   // The more dots, the nearer to the shortest possible step all of them are, and the sooner a fast plan is wanted.
-  if (reach.options.planning == Planning::kFast)
+  if (reach.options().planning == Planning::kFast)
     costs.kicks = std::min(costs.kicks, kKicksOfFastPlan / std::max<std::size_t>(1, dot_indices.size()));
   PosedDots posed;
   std::vector<std::uint32_t> left;
@@ -114,21 +115,19 @@ PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& do
   progress(.7);
 
   std::vector<Joints> first(tours.size());
-  Joints before = home_joints(reach.cell);
+  Joints before = home_joints(reach.cell());
   for (std::size_t t = 0; t < tours.size(); ++t)
     first[t] = before = unwrap_near(reach, aimed.position_O(tours[t].dots.front()), before, tours[t].station);
   std::vector<std::vector<PosedDot>> parts(tours.size());
-  for (std::size_t begin = 0; begin < tours.size(); begin += kToursAtOnce) {
-    const std::size_t end = std::min(tours.size(), begin + kToursAtOnce);
+  for_batches(tours.size(), kToursAtOnce, progress.part(.7, 1), [&](std::size_t begin, std::size_t end) {
     tbb::parallel_for(begin, end, [&](std::size_t t) { parts[t] = posed_tour(aimed, costs, tours[t], first[t]); });
-    progress(.7 + .3 * static_cast<double>(end) / static_cast<double>(tours.size()));
-  }
+  });
   posed.sequence.reserve(dot_indices.size());
-  before = home_joints(reach.cell);
+  before = home_joints(reach.cell());
   for (auto& part : parts) {
     if (part.empty()) continue;
     // An open path may be walked from either end.
-    if (step_s(reach.cell, before, part.back().joints) < step_s(reach.cell, before, part.front().joints))
+    if (step_s(reach.cell(), before, part.back().joints) < step_s(reach.cell(), before, part.front().joints))
       std::reverse(part.begin(), part.end());
     posed.sequence.insert(posed.sequence.end(), part.begin(), part.end());
     before = part.back().joints;

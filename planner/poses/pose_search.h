@@ -13,7 +13,7 @@ namespace hilbrush {
 
 /// Cost: 15 (fast, many dots) to 200 (quality) microseconds a dot and core; memory O(dots). The same for any number of
 /// threads.
-PosedDots search_poses(const Reach::Implementation& reach, const DotSequence& dots,
-                       std::span<const std::uint32_t> dot_indices, const Progress& progress = {});
+PosedDots search_poses(const Reach& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices,
+                       const Progress& progress = {});
 
 }  // namespace hilbrush

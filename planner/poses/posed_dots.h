@@ -6,8 +6,8 @@
 #include "sampling/base/progress.h"
 #include "sampling/dots/dots.h"
 
-/// What pose search hands on: which dots are exposed, in which order, with which joints. How the axes get from one to
-/// the next is the program builder's.
+/// The result of pose search: which dots are exposed, in which order, with which joints. The program builder adds how
+/// the axes get from one to the next.
 namespace hilbrush {
 
 struct PosedDot {
@@ -21,9 +21,5 @@ struct PosedDots {
 };
 
 Target target_of(const Dot& dot);
-Joints home_joints(const CellDescription& cell);
-
-/// Move and settle of a direct move between two exposures.
-double step_s(const CellDescription& cell, const Joints& from, const Joints& to);
 
 }  // namespace hilbrush

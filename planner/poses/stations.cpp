@@ -94,18 +94,15 @@ class StationChoice {
     const Option option{tour.station, {}, 0};
     const Eigen::Vector3d& middle_O = dots_.position_O(tour.dots[tour.dots.size() / 2]);
     const auto joints = joints_at(reach_, tour.station, middle_O, {});
-    return {{option.station, joints ? *joints : home_joints(reach_.cell), 0}};
+    return {{option.station, joints ? *joints : home_joints(reach_.cell()), 0}};
   }
 
   std::vector<Option> judged_options(const Tour& tour, std::size_t kept) const {
     std::vector<Option> options;
     for (const double tilt : reach_.tilts()) {
-      TableSolution solutions[2];
-      const int count = solve_table(reach_.kinematics, tilt, tour.beam_O, solutions);
-      for (int s = 0; s < count; ++s)
+      for (const TableSolution& solution : solve_table(reach_.kinematics(), tilt, tour.beam_O))
         for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative})
-          if (auto option = judge(tour, {tilt, solutions[s].rotation, solutions[s].yaw, elbow}))
-            options.push_back(*option);
+          if (auto option = judge(tour, {tilt, solution.rotation, solution.yaw, elbow})) options.push_back(*option);
     }
     std::stable_sort(options.begin(), options.end(),
                      [](const Option& a, const Option& b) { return a.work_s < b.work_s; });
@@ -129,7 +126,7 @@ class StationChoice {
       const auto next = joints_at(reach_, station, dots_.position_O(tour.dots[i + 1]), *joints);
       if (!next) continue;
       ++steps;
-      step_sum_s += step_s(reach_.cell, *joints, *next);
+      step_sum_s += step_s(reach_.cell(), *joints, *next);
     }
     if (served == 0) return std::nullopt;
     const auto n = static_cast<double>(count);
@@ -142,7 +139,7 @@ class StationChoice {
   void measure(const std::vector<std::size_t>* chosen) {
     const std::size_t n = tours_.size();
     distance_s_.assign((n + 1) * (n + 1), 0);
-    const std::vector<Option> home{{{}, home_joints(reach_.cell), 0}};
+    const std::vector<Option> home{{{}, home_joints(reach_.cell()), 0}};
     const auto options_of = [&](std::size_t t) -> std::span<const Option> {
       if (t == n) return home;
       if (!chosen) return options_[t];
@@ -154,7 +151,7 @@ class StationChoice {
         double least_s = std::numeric_limits<double>::infinity();
         for (const Option& from : options_of(a))
           for (const Option& to : options_of(b))
-            least_s = std::min(least_s, repose_s(reach_.cell, from.joints, to.joints));
+            least_s = std::min(least_s, repose_s(reach_.cell(), from.joints, to.joints));
         distance_s_[a * (n + 1) + b] = static_cast<float>(least_s);
       }
     });
@@ -222,7 +219,7 @@ class StationChoice {
     const std::size_t n = order_.size();
     std::vector<std::vector<std::uint16_t>> from(n);
     std::vector<double> cost_s{0};
-    std::vector<Joints> joints{home_joints(reach_.cell)};
+    std::vector<Joints> joints{home_joints(reach_.cell())};
     for (std::size_t k = 0; k < n; ++k) {
       const std::vector<Option>& options = options_[order_[k]];
       std::vector<double> next_cost_s(options.size(), std::numeric_limits<double>::infinity());
@@ -230,7 +227,7 @@ class StationChoice {
       from[k].resize(options.size());
       for (std::size_t o = 0; o < options.size(); ++o)
         for (std::size_t p = 0; p < cost_s.size(); ++p) {
-          const double cost = cost_s[p] + options[o].work_s + repose_s(reach_.cell, joints[p], options[o].joints);
+          const double cost = cost_s[p] + options[o].work_s + repose_s(reach_.cell(), joints[p], options[o].joints);
           if (cost >= next_cost_s[o]) continue;
           next_cost_s[o] = cost;
           next_joints[o] = options[o].joints;
@@ -249,7 +246,7 @@ class StationChoice {
   }
 
   const AimedDots& dots_;
-  const Reach::Implementation& reach_;
+  const Reach& reach_;
   std::vector<Tour>& tours_;
   std::vector<std::vector<Option>> options_;  ///< by tour, best first
   std::vector<float> distance_s_;
@@ -258,12 +255,10 @@ class StationChoice {
 
 }  // namespace
 
-std::optional<Joints> joints_at(const Reach::Implementation& reach, const Station& station,
-                                const Eigen::Vector3d& position_O, const Joints& reference) {
-  const TablePose table = reach.kinematics.table_pose(station.tilt, station.rotation);
-  Joints joints{};
-  if (!reach.arm_fits(table, position_O, station.yaw, station.elbow, reference, joints, nullptr)) return std::nullopt;
-  return joints;
+std::optional<Joints> joints_at(const Reach& reach, const Station& station, const Eigen::Vector3d& position_O,
+                                const Joints& reference) {
+  const TablePose table = reach.kinematics().table_pose(station.tilt, station.rotation);
+  return reach.arm_joints(table, position_O, station.yaw, station.elbow, reference);
 }
 
 void place_stations(const AimedDots& dots, std::vector<Tour>& tours, std::vector<std::uint32_t>& unserved) {

@@ -25,8 +25,8 @@ struct Tour {
 };
 
 /// Joints that expose the dot from the station, if arm, quill and links fit; windings nearest to the reference.
-std::optional<Joints> joints_at(const Reach::Implementation& reach, const Station& station,
-                                const Eigen::Vector3d& position_O, const Joints& reference);
+std::optional<Joints> joints_at(const Reach& reach, const Station& station, const Eigen::Vector3d& position_O,
+                                const Joints& reference);
 
 /// Gives each tour its station and puts the tours into the order in which they are visited: a tour of tours by
 /// exchanges, then the cheapest stations along it (Viterbi), from home to home. Tours that no station serves at all are

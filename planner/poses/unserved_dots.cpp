@@ -5,14 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "sampling/base/angles.h"
+#include "sampling/base/batches.h"
 
 namespace hilbrush {
 namespace {
 
 /// Where a dot cannot be exposed within the preferred incidence, its pose may deviate so much more than the best one
 /// found.
-constexpr double kIncidenceSlack = 4 * std::numbers::pi / 180;
+constexpr double kIncidenceSlack = 4 * kDegree;
 constexpr std::size_t kAtOnce = 512;  // between two words of progress
 constexpr std::size_t kMaxAskedPoses = 48, kMaxAskedDots = 1500;
 /// A station that serves fewer of the dots asked is not looked for among their poses any more.
@@ -32,14 +34,12 @@ class Leftovers {
   void find_poses(const std::vector<std::uint32_t>& left, std::vector<SkippedDot>& skipped, const Progress& progress) {
     left_.resize(left.size());
     std::vector<SkippedDot> refused(left.size());
-    const Joints home = home_joints(reach_.cell);
-    for (std::size_t first = 0; first < left.size(); first += kAtOnce) {
-      const std::size_t end = std::min(left.size(), first + kAtOnce);
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, 16), [&](const auto& range) {
+    const Joints home = home_joints(reach_.cell());
+    for_batches(left.size(), kAtOnce, progress, [&](std::size_t begin, std::size_t end) {
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) find_pose(left[i], home, left_[i], refused[i]);
       });
-      progress.step(end, left.size());
-    }
+    });
     for (std::size_t i = 0; i < left.size(); ++i)
       if (!left_[i].is_reachable) skipped.push_back(std::move(refused[i]));
     std::erase_if(left_, [](const Leftover& leftover) { return !leftover.is_reachable; });
@@ -69,12 +69,14 @@ class Leftovers {
  private:
   void find_pose(std::uint32_t dot, const Joints& home, Leftover& leftover, SkippedDot& refused) const {
     leftover.dot = dot;
+    PoseSearchResult found = reach_.find_pose(dots_.target(dot), home);
+    refused = std::move(found.skipped);
     refused.dot_index = dots_.dot_index(dot);
-    const auto pose = reach_.find_pose(dots_.target(dot), home, &refused);
+    const auto& pose = found.pose;
     if (!pose) return;
     leftover.is_reachable = true;
     leftover.station = {pose->table.tilt, pose->table.rotation, pose->yaw, pose->elbow};
-    leftover.cos_allowed = std::cos(std::max(kept_incidence(reach_.options), pose->from_smooth + kIncidenceSlack));
+    leftover.cos_allowed = std::cos(std::max(kept_incidence(reach_.options()), pose->from_smooth + kIncidenceSlack));
   }
 
   bool serves(const Station& station, const Eigen::Vector3d& beam_O, const Leftover& leftover) const {
@@ -83,8 +85,8 @@ class Leftovers {
            joints_at(reach_, station, target.position_O, {}) && reach_.is_clear(target, beam_O);
   }
   Eigen::Vector3d beam_of(const Station& station) const {
-    return reach_.kinematics.table_pose(station.tilt, station.rotation).R_WO.transpose() *
-           reach_.kinematics.beam_W(station.yaw);
+    return reach_.kinematics().table_pose(station.tilt, station.rotation).R_WO.transpose() *
+           reach_.kinematics().beam_W(station.yaw);
   }
 
   std::size_t best_tour(const Leftover& leftover) const {
@@ -135,7 +137,7 @@ class Leftovers {
   }
 
   const AimedDots& dots_;
-  const Reach::Implementation& reach_;
+  const Reach& reach_;
   std::vector<Tour>& tours_;
   std::vector<Leftover> left_;
 };

@@ -33,10 +33,10 @@ class YawPath {
         costs_(costs),
         reach_(dots.reach()),
         station_(station),
-        table_(reach_.kinematics.table_pose(station.tilt, station.rotation)),
+        table_(reach_.kinematics().table_pose(station.tilt, station.rotation)),
         tour_(tour),
         joints_(joints),
-        cost_(reach_.cell),
+        cost_(reach_.cell()),
         steps_away_(tour.size(), 0) {}
 
   /// First roughly, as far as the tool may turn; then in small steps around that.
@@ -62,8 +62,9 @@ class YawPath {
 
   /// What J4 turns by in one control tick: longer turns make steps longer.
   double one_tick_turn() const {
-    const double half_tick_s = reach_.cell.timing.tick_s / 2;
-    return std::clamp(reach_.cell.axes[kJ4].acceleration_max * half_tick_s * half_tick_s, .04 * kDegree, .4 * kDegree);
+    const double half_tick_s = reach_.cell().timing.tick_s / 2;
+    return std::clamp(reach_.cell().axes[kJ4].acceleration_max * half_tick_s * half_tick_s, .04 * kDegree,
+                      .4 * kDegree);
   }
 
   /// How far the tool may turn to one side so that beam and lens still pass everything.
@@ -72,9 +73,9 @@ class YawPath {
     const Eigen::Vector3d& position_O = dots_.position_O(tour_[i]);
     for (int k = kTried; k > 0; --k) {
       const double turn = kWidest * k / kTried;
-      const Eigen::Vector3d beam_O = table_.R_WO.transpose() * reach_.kinematics.beam_W(station_.yaw + side * turn);
-      if (reach_.clearance.lens_obstruction(position_O, beam_O) == Obstruction::kNone &&
-          reach_.clearance.beam_obstruction(position_O, beam_O) == Obstruction::kNone)
+      const Eigen::Vector3d beam_O = table_.R_WO.transpose() * reach_.kinematics().beam_W(station_.yaw + side * turn);
+      if (reach_.clearance().lens_obstruction(position_O, beam_O) == Obstruction::kNone &&
+          reach_.clearance().beam_obstruction(position_O, beam_O) == Obstruction::kNone)
         return static_cast<float>(turn);
     }
     return 0;
@@ -113,17 +114,17 @@ class YawPath {
 
   bool solve(std::size_t i, double yaw, Joints& joints) const {
     joints = joints_[i];
-    if (!reach_.kinematics.solve_arm(table_.to_W(dots_.position_O(tour_[i])), yaw, station_.elbow, joints))
+    if (!reach_.kinematics().solve_arm(table_.to_W(dots_.position_O(tour_[i])), yaw, station_.elbow, joints))
       return false;
-    joints[kJ4] = reach_.kinematics.unwrap_near(kJ4, joints[kJ4], joints_[i][kJ4]);
+    joints[kJ4] = reach_.kinematics().unwrap_near(kJ4, joints[kJ4], joints_[i][kJ4]);
     return true;
   }
 
   void fill(const YawGrid& grid, std::size_t i, Row& row) const {
     const Target target = dots_.target(tour_[i]);
     const Eigen::Vector3d smooth_W = table_.R_WO * target.smooth_normal_O, face_W = table_.R_WO * target.face_normal_O;
-    const double nominal = -reach_.kinematics.beam_W(station_.yaw).dot(smooth_W);
-    const double cos_least = std::min(nominal, std::cos(kept_incidence(reach_.options))) - 1e-9;
+    const double nominal = -reach_.kinematics().beam_W(station_.yaw).dot(smooth_W);
+    const double cos_least = std::min(nominal, std::cos(kept_incidence(reach_.options()))) - 1e-9;
     row.middle = steps_away_[i];
     row.cost_s.assign(static_cast<std::size_t>(grid.count()), kNever);
     row.arm.assign(row.cost_s.size(), arm_of(joints_[i]));
@@ -131,7 +132,7 @@ class YawPath {
       const int steps = row.middle + y - grid.half;
       const double turn = steps * grid.step, yaw = station_.yaw + turn;
       if (turn < -static_cast<double>(clear_[i][0]) || turn > static_cast<double>(clear_[i][1])) continue;
-      const Eigen::Vector3d beam_W = reach_.kinematics.beam_W(yaw);
+      const Eigen::Vector3d beam_W = reach_.kinematics().beam_W(yaw);
       const double cosine = -beam_W.dot(smooth_W);
       if (steps != 0 && (cosine < cos_least || -beam_W.dot(face_W) < reach_.cos_max_incidence())) continue;
       Joints joints = joints_[i];
@@ -168,16 +169,16 @@ class YawPath {
 
   void turn(std::size_t i, double offset) {
     const Target target = dots_.target(tour_[i]);
-    Joints joints{};
     const double yaw = station_.yaw + offset;
-    if (!reach_.arm_fits(table_, target.position_O, yaw, station_.elbow, joints_[i], joints, nullptr)) return;
-    if (std::abs(joints[kJ4] - joints_[i][kJ4]) > 1) return;  // it would unwind
-    if (reach_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics.beam_W(yaw))) joints_[i] = joints;
+    const auto joints = reach_.arm_joints(table_, target.position_O, yaw, station_.elbow, joints_[i]);
+    if (!joints) return;
+    if (std::abs((*joints)[kJ4] - joints_[i][kJ4]) > 1) return;  // it would unwind
+    if (reach_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics().beam_W(yaw))) joints_[i] = *joints;
   }
 
   const AimedDots& dots_;
   const AimCosts& costs_;
-  const Reach::Implementation& reach_;
+  const Reach& reach_;
   const Station& station_;
   const TablePose table_;
   std::span<const std::uint32_t> tour_;

@@ -20,7 +20,7 @@ class BeamDirections {
 
   /// Indices, in ascending order, of all directions that hit the target within acos(cos_least) of its smooth normal and
   /// within the cone of its face normal. Cost: some microseconds for each direction within the two cones.
-  std::vector<std::uint32_t> that_hit(const Reach::Implementation& reach, const Target& target, double cos_least) const;
+  std::vector<std::uint32_t> that_hit(const Reach& reach, const Target& target, double cos_least) const;
 
  private:
   std::vector<Eigen::Vector3d> directions_O_;

@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {
 
-/// The straight arm is singular: J1 and J2 would have to race for a small move along the arm.
-constexpr double kStraightGuard = 3 * std::numbers::pi / 180;
+/// The straight arm is singular: J1 and J2 would have to move very fast for a small move along the arm.
+constexpr double kStraightGuard = kTurn / 120;  // 3 degrees
 
 double wrapped(double angle) {
   return std::remainder(angle, kTurn);
@@ -101,27 +100,25 @@ Joints Kinematics::per_yaw(const Joints& joints) const {
 LimitExcess Kinematics::limit_excess(const Joints& joints) const {
   LimitExcess worst{0, -std::numeric_limits<double>::infinity()};
   double worst_share = -std::numeric_limits<double>::infinity();
-  const auto consider = [&](int axis, double amount) {
+  const auto consider = [&](std::size_t axis, double amount) {
     const double share = amount / (axis_max(axis) - axis_min(axis));
     if (share <= worst_share) return;
     worst = {axis, amount};
     worst_share = share;
   };
-  for (int axis = 0; axis < kAxisCount; ++axis) {
-    const double value = joints[static_cast<std::size_t>(axis)];
-    consider(axis, std::max(value - axis_max(axis), axis_min(axis) - value));
-  }
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    consider(axis, std::max(joints[axis] - axis_max(axis), axis_min(axis) - joints[axis]));
   consider(kJ2, kStraightGuard - std::abs(joints[kJ2]));
   return worst;
 }
 
-double Kinematics::unwrap_near(int axis, double angle, double reference) const {
+double Kinematics::unwrap_near(std::size_t axis, double angle, double reference) const {
   const double low = axis_min(axis), high = axis_max(axis);
   const double nearest = angle + kTurn * std::round((reference - angle) / kTurn);
   if (nearest >= low && nearest <= high) return nearest;
-  const double unwound = nearest > high ? angle + kTurn * std::floor((high - angle) / kTurn)
-                                        : angle + kTurn * std::ceil((low - angle) / kTurn);
-  return unwound >= low && unwound <= high ? unwound : angle;
+  const double unwrapped = nearest > high ? angle + kTurn * std::floor((high - angle) / kTurn)
+                                          : angle + kTurn * std::ceil((low - angle) / kTurn);
+  return unwrapped >= low && unwrapped <= high ? unwrapped : angle;
 }
 
 }  // namespace hilbrush

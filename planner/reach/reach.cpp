@@ -48,113 +48,111 @@ double tilt_excess(const Kinematics& kinematics, const Eigen::Vector3d& beam_O) 
 
 }  // namespace
 
-int solve_table(const Kinematics& kinematics, double tilt, const Eigen::Vector3d& beam_O, TableSolution* solutions) {
-  const double ce = kinematics.cos_depression(), se = kinematics.sin_depression();
-  const double ca = std::cos(tilt), sa = std::sin(tilt);
-  if (std::abs(sa * ce) < 1e-4) return 0;  // A = 0: C is parallel to yaw, no yaw changes the height of the beam
+TableSolutions solve_table(const Kinematics& kinematics, double tilt, const Eigen::Vector3d& beam_O) {
+  const double ce = kinematics.cos_depression();
+  const double se = kinematics.sin_depression();
+  const double ca = std::cos(tilt);
+  const double sa = std::sin(tilt);
+  if (std::abs(sa * ce) < 1e-4) return {};  // A = 0: C is parallel to yaw, no yaw changes the height of the beam
   const double cos_yaw = -(beam_O.z() + ca * se) / (sa * ce);
-  if (std::abs(cos_yaw) > 1) return 0;
+  if (std::abs(cos_yaw) > 1) return {};
   const double azimuth_O = std::atan2(beam_O.y(), beam_O.x());
+  const auto solution = [&](double yaw) -> TableSolution {
+    const double x = ca * ce * cos_yaw - sa * se;
+    const double y = ce * std::sin(yaw);
+    return {yaw, std::remainder(std::atan2(y, x) - azimuth_O, kTurn)};
+  };
   const double yaw = std::acos(cos_yaw);
-  for (int i = 0; i < 2; ++i) {
-    const double signed_yaw = i == 0 ? yaw : -yaw;
-    const double x = ca * ce * cos_yaw - sa * se, y = ce * std::sin(signed_yaw);
-    solutions[i] = {signed_yaw, std::remainder(std::atan2(y, x) - azimuth_O, 2 * std::numbers::pi)};
-  }
-  return 2;
+  return TableSolutions({solution(yaw), solution(-yaw)});
 }
 
-Reach::Implementation::Implementation(const TexturedMesh& mesh, const CellDescription& cell_description,
-                                      const PlanOptions& plan_options)
-    : cell(cell_description), options(plan_options), kinematics(cell), clearance(mesh, cell) {
-  const double max_incidence = options.max_incidence - kIncidenceGuard;
+Reach::Reach(const TexturedMesh& mesh, const CellDescription& cell, const PlanOptions& options)
+    : cell_(cell), options_(options), kinematics_(cell_), clearance_(mesh, cell_) {
+  const double max_incidence = options_.max_incidence - kIncidenceGuard;
   cos_max_incidence_ = std::cos(max_incidence);
   cone_ = rings(max_incidence, 5, 9 * kDegree);
   fine_cone_ = rings(max_incidence, 9, 5 * kDegree);
   finest_cone_ = rings(max_incidence, 18, 2.5 * kDegree);
-  tilts_ = steps(kinematics.axis_max(kTilt), kinematics.axis_min(kTilt), kTiltStep);
-  fine_tilts_ = steps(kinematics.axis_max(kTilt), kinematics.axis_min(kTilt), kFineTiltStep);
+  tilts_ = steps(kinematics_.axis_max(kTilt), kinematics_.axis_min(kTilt), kTiltStep);
+  fine_tilts_ = steps(kinematics_.axis_max(kTilt), kinematics_.axis_min(kTilt), kFineTiltStep);
 }
 
-bool Reach::Implementation::arm_fits(const TablePose& table, const Eigen::Vector3d& position_O, double yaw, Elbow elbow,
-                                     const Joints& reference, Joints& joints, FailureTally* tally) const {
+std::optional<Joints> Reach::arm_joints(const TablePose& table, const Eigen::Vector3d& position_O, double yaw,
+                                        Elbow elbow, const Joints& reference, FailureTally* tally) const {
+  Joints joints{};
   double boundary_excess_m = 0;
-  if (!kinematics.solve_arm(table.to_W(position_O), yaw, elbow, joints, &boundary_excess_m)) {
+  if (!kinematics_.solve_arm(table.to_W(position_O), yaw, elbow, joints, &boundary_excess_m)) {
     if (tally) tally->workspace_boundary(boundary_excess_m);
-    return false;
+    return std::nullopt;
   }
-  joints[kJ4] = kinematics.unwrap_near(kJ4, joints[kJ4], reference[kJ4]);
+  joints[kJ4] = kinematics_.unwrap_near(kJ4, joints[kJ4], reference[kJ4]);
   joints[kTilt] = table.tilt;
   joints[kRotation] = table.rotation;
-  const LimitExcess excess = kinematics.limit_excess(joints);
+  const LimitExcess excess = kinematics_.limit_excess(joints);
   if (!excess.is_inside()) {
     if (tally) tally->limit(excess);
-    return false;
+    return std::nullopt;
   }
-  const ToolPose tool = kinematics.tool_pose(table, position_O, yaw);
-  if (clearance.quill_obstruction(tool) != Obstruction::kNone) {
-    if (tally) tally->quill(clearance.quill_shortfall(tool));
-    return false;
+  const ToolPose tool = kinematics_.tool_pose(table, position_O, yaw);
+  if (clearance_.quill_obstruction(tool) != Obstruction::kNone) {
+    if (tally) tally->quill(clearance_.quill_shortfall(tool));
+    return std::nullopt;
   }
-  if (clearance.links_obstruction(table, joints) == Obstruction::kNone) return true;
-  if (tally) tally->links(clearance.links_shortfall(table, joints));
-  return false;
-}
-
-std::optional<DotPose> Reach::Implementation::pose_for_beam(const Target& target, const Eigen::Vector3d& beam_O,
-                                                            const std::vector<double>& tilts, const Joints& reference,
-                                                            FailureTally* tally) const {
-  bool has_tilt = false;
-  for (const double tilt : tilts) {
-    TableSolution solutions[2];
-    const int count = solve_table(kinematics, tilt, beam_O, solutions);
-    for (int i = 0; i < count; ++i) {
-      has_tilt = true;
-      DotPose pose;
-      pose.table =
-          kinematics.table_pose(tilt, kinematics.unwrap_near(kRotation, solutions[i].rotation, reference[kRotation]));
-      pose.yaw = solutions[i].yaw;
-      for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
-        if (!arm_fits(pose.table, target.position_O, pose.yaw, elbow, reference, pose.joints, tally)) continue;
-        pose.elbow = elbow;
-        pose.from_smooth = std::acos(std::clamp(-beam_O.dot(target.smooth_normal_O), -1., 1.));
-        return pose;
-      }
-    }
-  }
-  if (!has_tilt && tally) tally->no_tilt(tilt_excess(kinematics, beam_O));
+  if (clearance_.links_obstruction(table, joints) == Obstruction::kNone) return joints;
+  if (tally) tally->links(clearance_.links_shortfall(table, joints));
   return std::nullopt;
 }
 
-bool Reach::Implementation::is_clear(const Target& target, const Eigen::Vector3d& beam_O) const {
-  return -beam_O.dot(target.face_normal_O) >= cos_max_incidence_ &&
-         clearance.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
-         clearance.beam_obstruction(target.position_O, beam_O) == Obstruction::kNone;
+std::optional<DotPose> Reach::pose_for_beam(const Target& target, const Eigen::Vector3d& beam_O,
+                                            const std::vector<double>& tilts, const Joints& reference,
+                                            FailureTally* tally) const {
+  bool has_tilt = false;
+  for (const double tilt : tilts) {
+    for (const TableSolution& solution : solve_table(kinematics_, tilt, beam_O)) {
+      has_tilt = true;
+      const TablePose table =
+          kinematics_.table_pose(tilt, kinematics_.unwrap_near(kRotation, solution.rotation, reference[kRotation]));
+      for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
+        const auto joints = arm_joints(table, target.position_O, solution.yaw, elbow, reference, tally);
+        if (!joints) continue;
+        const double from_smooth = std::acos(std::clamp(-beam_O.dot(target.smooth_normal_O), -1., 1.));
+        return DotPose{table, solution.yaw, elbow, *joints, from_smooth};
+      }
+    }
+  }
+  if (!has_tilt && tally) tally->no_tilt(tilt_excess(kinematics_, beam_O));
+  return std::nullopt;
 }
 
-bool Reach::Implementation::can_hit(const Target& target, const Eigen::Vector3d& beam_O) const {
+bool Reach::is_clear(const Target& target, const Eigen::Vector3d& beam_O) const {
+  return -beam_O.dot(target.face_normal_O) >= cos_max_incidence_ &&
+         clearance_.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
+         clearance_.beam_obstruction(target.position_O, beam_O) == Obstruction::kNone;
+}
+
+bool Reach::can_hit(const Target& target, const Eigen::Vector3d& beam_O) const {
   if (!is_clear(target, beam_O)) return false;
   const Joints anywhere{};
   return pose_for_beam(target, beam_O, tilts_, anywhere, nullptr) ||
          pose_for_beam(target, beam_O, fine_tilts_, anywhere, nullptr);
 }
 
-std::optional<DotPose> Reach::Implementation::search_cone(const Target& target, const Eigen::Vector3d& axis_O,
-                                                          const Directions& cone, const std::vector<double>& tilts,
-                                                          const Joints& reference, FailureTally* tally) const {
+std::optional<DotPose> Reach::search_cone(const Target& target, const Eigen::Vector3d& axis_O, const Directions& cone,
+                                          const std::vector<double>& tilts, const Joints& reference,
+                                          FailureTally* tally) const {
   const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
   for (const Eigen::Vector3d& direction : cone) {
     const Eigen::Vector3d beam_O = -(direction.x() * u + direction.y() * v + direction.z() * axis_O);
     if (-beam_O.dot(target.face_normal_O) < cos_max_incidence_ - 1e-9) continue;
-    // What no tilt gives need not be clear, unless somebody wants to be told of it.
-    if (!tally && tilt_excess(kinematics, beam_O) > 1e-6) continue;
-    const Obstruction beam = clearance.beam_obstruction(target.position_O, beam_O);
+    // Without a tally, beams that no tilt gives need no clearance test.
+    if (!tally && tilt_excess(kinematics_, beam_O) > 1e-6) continue;
+    const Obstruction beam = clearance_.beam_obstruction(target.position_O, beam_O);
     if (beam != Obstruction::kNone) {
-      if (tally) tally->beam(beam, clearance.beam_free_length_m(target.position_O, beam_O));
+      if (tally) tally->beam(beam, clearance_.beam_free_length_m(target.position_O, beam_O));
       continue;
     }
-    if (clearance.lens_obstruction(target.position_O, beam_O) != Obstruction::kNone) {
-      if (tally) tally->lens(clearance.lens_shortfall(target.position_O, beam_O));
+    if (clearance_.lens_obstruction(target.position_O, beam_O) != Obstruction::kNone) {
+      if (tally) tally->lens(clearance_.lens_shortfall(target.position_O, beam_O));
       continue;
     }
     if (auto pose = pose_for_beam(target, beam_O, tilts, reference, tally)) return pose;
@@ -162,36 +160,27 @@ std::optional<DotPose> Reach::Implementation::search_cone(const Target& target, 
   return std::nullopt;
 }
 
-std::optional<DotPose> Reach::Implementation::find_pose_quickly(const Target& target, const Joints& reference) const {
+std::optional<DotPose> Reach::find_pose_quickly(const Target& target, const Joints& reference) const {
   auto pose = search_cone(target, target.smooth_normal_O, cone_, tilts_, reference, nullptr);
   if (!pose && target.smooth_normal_O.dot(target.face_normal_O) < .999)
     pose = search_cone(target, target.face_normal_O, cone_, tilts_, reference, nullptr);
   return pose;
 }
 
-std::optional<DotPose> Reach::Implementation::find_pose(const Target& target, const Joints& reference,
-                                                        SkippedDot* skipped) const {
-  auto pose = find_pose_quickly(target, reference);
-  if (!pose) {
-    // Why not, is asked while looking more closely. A third look is for windows that are narrower still: what is clear
-    // says nothing of how near they are to the tilts that are possible.
-    FailureTally tally;
-    pose = search_cone(target, target.face_normal_O, fine_cone_, tilts_, reference, &tally);
-    if (!pose && tally.is_nearly_reached())
-      pose = search_cone(target, target.face_normal_O, finest_cone_, fine_tilts_, reference, nullptr);
-    if (!pose && skipped) tally.tell(*skipped);
-  }
-  return pose;
+PoseSearchResult Reach::find_pose(const Target& target, const Joints& reference) const {
+  if (auto pose = find_pose_quickly(target, reference)) return {std::move(pose), {}};
+  // The second, finer search finds the reason as well. A third one is for windows that are narrower still; near to one
+  // are those of the failures that little is missing to, whatever the clearance_.
+  FailureTally tally;
+  auto pose = search_cone(target, target.face_normal_O, fine_cone_, tilts_, reference, &tally);
+  if (!pose && tally.is_nearly_reached())
+    pose = search_cone(target, target.face_normal_O, finest_cone_, fine_tilts_, reference, nullptr);
+  if (pose) return {std::move(pose), {}};
+  return {std::nullopt, tally.describe()};
 }
 
-Reach::Reach(const TexturedMesh& mesh, const CellDescription& cell, const PlanOptions& options)
-    : implementation_(std::make_unique<Implementation>(mesh, cell, options)) {}
-Reach::~Reach() = default;
-Reach::Reach(Reach&&) noexcept = default;
-
-bool Reach::is_reachable(const Eigen::Vector3d& position_O, const Eigen::Vector3d& normal_O,
-                         SkippedDot* skipped) const {
-  return implementation_->find_pose({position_O, normal_O, normal_O}, {}, skipped).has_value();
+bool Reach::is_reachable(const Eigen::Vector3d& position_O, const Eigen::Vector3d& normal_O) const {
+  return find_pose({position_O, normal_O, normal_O}, {}).pose.has_value();
 }
 
 }  // namespace hilbrush

@@ -1,26 +1,21 @@
 #include "planner/reach/reach_failure.h"
 
 #include <array>
-#include <cstdio>
+#include <string>
+#include <string_view>
 
 #include "sampling/base/angles.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
 
-/// Two digits, and all of those before the point.
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, value < 10 ? "%.2g" : "%.0f", value);
-  return text;
-}
-
-struct Excuse {
+struct Cause {
   SkipReason reason;
   const char* what;
 };
 
-Excuse excuse_of(Obstruction what) {
+Cause cause_of(Obstruction what) {
   switch (what) {
     case Obstruction::kNone:
       break;
@@ -56,32 +51,19 @@ constexpr std::array<const char*, kAxisCount> kPastLimit{"J1 past its limit",   
                                                          "J3 past its limit",   "J4 past its limit",
                                                          "tilt past its limit", "rotation past its limit"};
 constexpr std::array<const char*, kAxisCount> kAxisWords{"J1", "J2", "J3", "J4", "tilt", "rotation"};
+constexpr std::string_view kOutOfReach = "out of the arm's reach";
+
+std::string millimeters(double length_m) {
+  return amount(length_m * 1e3) + " mm";
+}
+
+std::string degrees(double angle) {
+  return amount(angle / kDegree) + " degrees";
+}
 
 }  // namespace
 
-const char* skip_reason_name(SkipReason reason) {
-  switch (reason) {
-    case SkipReason::kOccluded:
-      return "occluded";
-    case SkipReason::kIncidence:
-      return "incidence";
-    case SkipReason::kJointLimit:
-      return "joint_limit";
-    case SkipReason::kLensObject:
-      return "lens_object";
-    case SkipReason::kLensTable:
-      return "lens_table";
-    case SkipReason::kEnergy:
-      return "energy";
-    case SkipReason::kArm:
-      return "arm";
-    case SkipReason::kNoWay:
-      return "no_way";
-  }
-  return "unknown";
-}
-
-bool FailureTally::is_better(Stage stage, double shortfall) {
+bool FailureTally::replaces(Stage stage, double shortfall) {
   if (stage < stage_ || (stage == stage_ && shortfall >= shortfall_)) return false;
   stage_ = stage;
   shortfall_ = shortfall;
@@ -89,13 +71,13 @@ bool FailureTally::is_better(Stage stage, double shortfall) {
 }
 
 void FailureTally::body(Stage stage, const Shortfall& shortfall) {
-  if (!is_better(stage, shortfall.amount_m)) return;
+  if (!replaces(stage, shortfall.amount_m)) return;
   what_ = shortfall.what;
   amount_ = shortfall.amount_m;
 }
 
 void FailureTally::beam(Obstruction what, double free_m) {
-  if (!is_better(kBeam, what == Obstruction::kBeamObject ? -free_m : 1)) return;
+  if (!replaces(kBeam, what == Obstruction::kBeamObject ? -free_m : 1)) return;
   what_ = what;
   amount_ = free_m;
 }
@@ -113,16 +95,20 @@ void FailureTally::links(const Shortfall& shortfall) {
 }
 
 void FailureTally::no_tilt(double excess) {
-  if (is_better(kTable, excess)) amount_ = excess;
+  if (replaces(kTable, excess)) amount_ = excess;
 }
 
 void FailureTally::workspace_boundary(double excess_m) {
-  // An arm that is too short fails before any limit: whoever fails a limit came farther.
-  if (is_better(kLimit, 10 + excess_m)) axis_ = kAxisCount, amount_ = excess_m;
+  // An arm that is too short fails before any limit: a candidate that fails a limit has passed more checks.
+  if (!replaces(kLimit, 10 + excess_m)) return;
+  axis_ = kAxisCount;
+  amount_ = excess_m;
 }
 
 void FailureTally::limit(const LimitExcess& excess) {
-  if (is_better(kLimit, excess.amount)) axis_ = excess.axis, amount_ = excess.amount;
+  if (!replaces(kLimit, excess.amount)) return;
+  axis_ = excess.axis;
+  amount_ = excess.amount;
 }
 
 bool FailureTally::is_nearly_reached() const {
@@ -147,36 +133,33 @@ bool FailureTally::is_nearly_reached() const {
   return true;
 }
 
-void FailureTally::tell(SkippedDot& skipped) const {
-  const auto millimeters = [this] { return number(amount_ * 1e3) + " mm"; };
-  const auto degrees = [this] { return number(amount_ / kDegree) + " degrees"; };
-  skipped.amount = amount_;
-  skipped.is_angle = false;
-  if (stage_ == kTable) {
-    skipped.reason = SkipReason::kIncidence;
-    skipped.what = kPastLimit[kTilt];
-    skipped.is_angle = true;
-    skipped.detail = std::string(kAxisWords[kTilt]) + " " + degrees() + " past its limit";
-  } else if (stage_ == kLimit) {
-    skipped.reason = SkipReason::kJointLimit;
-    if (axis_ == kAxisCount) {
-      skipped.what = "out of the arm's reach";
-      skipped.detail = millimeters() + " out of the arm's reach";
-      return;
-    }
-    const auto axis = static_cast<std::size_t>(axis_);
-    skipped.what = kPastLimit[axis];
-    skipped.is_angle = axis_ != kJ3;
-    skipped.detail =
-        std::string(kAxisWords[axis]) + " " + (skipped.is_angle ? degrees() : millimeters()) + " past its limit";
-  } else {
-    const Excuse excuse = excuse_of(what_);
-    skipped.reason = excuse.reason;
-    skipped.what = excuse.what;
-    skipped.detail = excuse.what;
-    if (stage_ == kBeam) skipped.detail += " " + millimeters() + " from the dot";
-    if (stage_ > kLimit || stage_ == kLens) skipped.detail += ", " + millimeters() + " too near";
+SkippedDot FailureTally::describe() const {
+  if (stage_ == kTable) return past_limit(SkipReason::kIncidence, kTilt);
+  if (stage_ == kLimit) {
+    if (axis_ != kAxisCount) return past_limit(SkipReason::kJointLimit, axis_);
+    return {0,       SkipReason::kJointLimit,   millimeters(amount_) + " " + std::string(kOutOfReach), kOutOfReach,
+            amount_, SkipMeasure::kExcessLength};
   }
+  const Cause cause = cause_of(what_);
+  SkippedDot skipped{0, cause.reason, cause.what, cause.what, amount_, SkipMeasure::kExcessLength};
+  if (stage_ == kBeam) {
+    skipped.measure = SkipMeasure::kFreeLength;
+    skipped.detail += " " + millimeters(amount_) + " from the dot";
+  } else if (stage_ != kNone) {
+    skipped.detail += ", " + millimeters(amount_) + " too near";
+  }
+  return skipped;
+}
+
+SkippedDot FailureTally::past_limit(SkipReason reason, std::size_t axis) const {
+  const bool is_angle = axis != kJ3;
+  const std::string excess = is_angle ? degrees(amount_) : millimeters(amount_);
+  return {0,
+          reason,
+          std::string(kAxisWords[axis]) + " " + excess + " past its limit",
+          kPastLimit[axis],
+          amount_,
+          is_angle ? SkipMeasure::kExcessAngle : SkipMeasure::kExcessLength};
 }
 
 }  // namespace hilbrush

@@ -1,9 +1,9 @@
 #pragma once
-#include "planner/plan.h"
 #include "planner/reach/clearance.h"
+#include "planner/reach/skipped_dot.h"
 
-/// Inside planner/: why a dot is out of reach, as it is told: of all candidates, the excuse of the one that came
-/// farthest, with the amount.
+/// Why a dot is out of reach: of all candidate poses, the failure of the one that passed the most checks, with the
+/// amount.
 namespace hilbrush {
 
 class FailureTally {
@@ -18,22 +18,24 @@ class FailureTally {
   void quill(const Shortfall& shortfall);
   void links(const Shortfall& shortfall);
 
-  void tell(SkippedDot& skipped) const;
-  /// Whether so little is missing that finer directions and tilts might find it.
+  SkippedDot describe() const;
+  /// Whether little enough is missing that finer directions and tilts might find it.
   bool is_nearly_reached() const;
 
  private:
-  /// The checks in their order: who fails a later one came farther.
+  /// The checks in their order.
   enum Stage { kNone, kBeam, kLens, kTable, kLimit, kQuill, kLinks };
-  /// Whether this excuse becomes the one that is told; of one stage the smallest shortfall does.
-  bool is_better(Stage stage, double shortfall);
+  /// Whether this failure replaces the one that is kept: it is of a later check, or of the same one with a smaller
+  /// shortfall. Then it does.
+  bool replaces(Stage stage, double shortfall);
   void body(Stage stage, const Shortfall& shortfall);
+  SkippedDot past_limit(SkipReason reason, std::size_t axis) const;
 
   Stage stage_ = kNone;
   double shortfall_ = 0;
   Obstruction what_ = Obstruction::kNone;
-  int axis_ = 0;
-  double amount_ = 0;  ///< rad or m
+  std::size_t axis_ = 0;  ///< kAxisCount: the workspace boundary
+  double amount_ = 0;     ///< rad or m
 };
 
 }  // namespace hilbrush

@@ -2,17 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "planner/cell_model/time_model.h"
+#include "sampling/base/angles.h"
 
 namespace hilbrush {
 namespace {
 
-/// Nearer than this the tool does not come while it moves.
+/// The distance that the tool keeps from everything while it moves; less than half of Clearance::kMarginM.
 constexpr double kMinSlackM = .4e-3;
-/// ... unless it starts nearer, because it was stopped there: then it may leave.
+/// ... unless it starts nearer, because it was stopped there: it may leave such a pose.
 constexpr double kMinSlackOfEscapeM = .05e-3;
+/// How far the tool backs off along its beam, tried in this order.
 constexpr double kBackOffsM[] = {.005, .01, .02, .03, .045, .06, .08, .1};
 
 /// Distance covered `time_s` into a move over `distance` from rest to rest.
@@ -33,7 +34,7 @@ Elbow elbow_of(const Joints& joints) {
 }  // namespace
 
 bool Transit::needs_retract(const Joints& from, const Joints& to) {
-  constexpr double kHalfTurn = std::numbers::pi;
+  constexpr double kHalfTurn = kTurn / 2;
   return (from[kJ2] >= 0) != (to[kJ2] >= 0) || std::abs(to[kJ4] - from[kJ4]) > kHalfTurn ||
          std::abs(to[kRotation] - from[kRotation]) > kHalfTurn;
 }
@@ -49,15 +50,13 @@ Joints joints_during(const CellDescription& cell, const Joints& from, const Join
 }
 
 double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
-  const auto& arm = reach_.cell.arm;
-  const auto& lens = reach_.cell.lens;
+  const auto& arm = reach_.cell().arm;
+  const auto& lens = reach_.cell().lens;
   // From the flange's axis to the farthest point of lens or quill, horizontally.
   const double lens_m =
       std::hypot(std::max(lens.far_m - arm.flange_to_focus_m, arm.flange_to_focus_m - lens.near_m), lens.radius_m);
   const double tool_m = std::max(lens_m, arm.quill_radius_m);
-  const auto moved = [&](int axis) {
-    return std::abs(b[static_cast<std::size_t>(axis)] - a[static_cast<std::size_t>(axis)]);
-  };
+  const auto moved = [&](std::size_t axis) { return std::abs(b[axis] - a[axis]); };
   // Along the arm the flange is farthest from J1 at the straighter of the two ends.
   const double c = std::cos(std::min(std::abs(a[kJ2]), std::abs(b[kJ2])));
   const double l1 = arm.upper_arm_m, l2 = arm.forearm_m;
@@ -68,41 +67,41 @@ double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
   const double yaw_change = std::max(left, right);
   // With the arm folded the elbow is the farthest point of the links.
   return moved(kJ1) * std::max(flange_m, l1) + moved(kJ2) * l2 + yaw_change * tool_m + moved(kJ3) +
-         moved(kTilt) * reach_.clearance.radius_around_tilt_m() +
-         moved(kRotation) * reach_.clearance.radius_around_rotation_m();
+         moved(kTilt) * reach_.clearance().radius_around_tilt_m() +
+         moved(kRotation) * reach_.clearance().radius_around_rotation_m();
 }
 
 double Transit::least_slack_m(const Joints& from) const {
-  const double slack_m = reach_.clearance.slack_m(reach_.kinematics, from);
+  const double slack_m = reach_.clearance().slack_m(reach_.kinematics(), from);
   return std::clamp(.5 * slack_m, kMinSlackOfEscapeM, kMinSlackM);
 }
 
 bool Transit::is_clear_at(const Joints& joints) const {
-  return reach_.clearance.slack_m(reach_.kinematics, joints) >= kMinSlackM;
+  return reach_.clearance().slack_m(reach_.kinematics(), joints) >= kMinSlackM;
 }
 
 bool Transit::is_clear(const Joints& from, const Joints& to) const {
   const double least_m = least_slack_m(from);
-  const auto slack_at = [&](const Joints& joints) { return reach_.clearance.slack_m(reach_.kinematics, joints); };
+  const auto slack_at = [&](const Joints& joints) { return reach_.clearance().slack_m(reach_.kinematics(), joints); };
   double slack_m = slack_at(from);
   if (travel_bound_m(from, to) <= slack_m) return true;
   if (slack_at(to) < kMinSlackM) return false;
 
   double end_s = 0;
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    end_s = std::max(end_s, trapezoid_s(std::abs(to[i] - from[i]), reach_.cell.axes[i].speed_max,
-                                        reach_.cell.axes[i].acceleration_max));
+    end_s = std::max(end_s, trapezoid_s(std::abs(to[i] - from[i]), reach_.cell().axes[i].speed_max,
+                                        reach_.cell().axes[i].acceleration_max));
   Joints now = from;
   double now_s = 0, step_s = end_s / 4;
   while (true) {
     if (slack_m < least_m) return false;
     if (travel_bound_m(now, to) <= slack_m) return true;
-    // The axes do not turn round during a move, so the bound between two moments holds for all between them.
+    // The axes do not reverse during a move, so the bound between two moments holds for all between them.
     step_s = std::min(2 * step_s, end_s - now_s);
-    Joints next = joints_during(reach_.cell, from, to, now_s + step_s);
+    Joints next = joints_during(reach_.cell(), from, to, now_s + step_s);
     while (travel_bound_m(now, next) > slack_m) {
       step_s /= 2;
-      next = joints_during(reach_.cell, from, to, now_s + step_s);
+      next = joints_during(reach_.cell(), from, to, now_s + step_s);
     }
     now_s += step_s;
     now = next;
@@ -110,14 +109,14 @@ bool Transit::is_clear(const Joints& from, const Joints& to) const {
   }
 }
 
-bool Transit::are_clear(const std::vector<Joints>& way) const {
-  for (std::size_t i = 1; i < way.size(); ++i)
-    if (!is_clear(way[i - 1], way[i])) return false;
+bool Transit::are_clear(const std::vector<Joints>& path) const {
+  for (std::size_t i = 1; i < path.size(); ++i)
+    if (!is_clear(path[i - 1], path[i])) return false;
   return true;
 }
 
 std::optional<Joints> Transit::backed_off(const Joints& joints, double distance_m) const {
-  const auto& kinematics = reach_.kinematics;
+  const auto& kinematics = reach_.kinematics();
   const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
   const ToolPose tool = kinematics.tool_pose(joints);
   const double yaw = kinematics.yaw(joints);
@@ -133,7 +132,7 @@ std::optional<Joints> Transit::backed_off(const Joints& joints, double distance_
 }
 
 Joints Transit::lifted(Joints joints) const {
-  joints[kJ3] = std::max(joints[kJ3], reach_.kinematics.axis_max(kJ3));
+  joints[kJ3] = std::max(joints[kJ3], reach_.kinematics().axis_max(kJ3));
   return joints;
 }
 
@@ -147,25 +146,25 @@ std::optional<std::vector<Joints>> Transit::route(const Joints& from, const Join
   }
   const auto out = retreat(from, true), in = retreat(to, false);
   if (!out || !in) return std::nullopt;
-  std::vector<Joints> way = *out;
+  std::vector<Joints> path = *out;
   if (!is_clear(out->back(), in->back())) {
     // The arm goes home, the table turns, the arm comes back.
     Joints before = out->back(), after = in->back();
-    for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4}) before[axis] = after[axis] = reach_.cell.axes[axis].home;
+    for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4}) before[axis] = after[axis] = reach_.cell().axes[axis].home;
     if (!are_clear({out->back(), before, after, in->back()})) return std::nullopt;
-    way.push_back(before);
-    way.push_back(after);
+    path.push_back(before);
+    path.push_back(after);
   }
-  way.insert(way.end(), in->rbegin(), in->rend());
-  return way;
+  path.insert(path.end(), in->rbegin(), in->rend());
+  return path;
 }
 
 std::optional<std::vector<Joints>> Transit::retreat(const Joints& pose, bool is_outwards) const {
   const auto is_usable = [&](const std::vector<Joints>& outwards) {
-    std::vector<Joints> way{pose};
-    way.insert(way.end(), outwards.begin(), outwards.end());
-    if (!is_outwards) std::reverse(way.begin(), way.end());
-    return are_clear(way);
+    std::vector<Joints> path{pose};
+    path.insert(path.end(), outwards.begin(), outwards.end());
+    if (!is_outwards) std::reverse(path.begin(), path.end());
+    return are_clear(path);
   };
   // In one go; or in steps, because the axes do not arrive together and the shorter a step, the less it strays from the
   // beam.

@@ -8,13 +8,13 @@
 #include "planner/reach/transit.h"
 
 /// The last resort of Transit: RRT-connect (Kuffner and LaValle 2000) in the six joints. What differs: edges are whole
-/// moves, each checked as the axes will really run it, which is not the same there and back; and samples are drawn near
-/// the two ends too, where the tool has to find its way out of something.
+/// moves, each checked as the axes will really run it, which differs between the two directions; and samples are drawn
+/// near the two ends too, where the tool may have to leave a narrow place.
 namespace hilbrush {
 namespace {
 
-constexpr int kSamples = 500;
-constexpr std::size_t kJoinsTried = 3;
+constexpr int kMaxSamples = 500;
+constexpr std::size_t kMaxJoins = 3;  // nodes of the other tree that a new node is joined to
 
 struct Node {
   Joints joints;
@@ -45,18 +45,16 @@ class Sampler {
  private:
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
   Joints limited(Joints joints) const {
-    for (int axis = 0; axis < kAxisCount; ++axis) {
-      double& value = joints[static_cast<std::size_t>(axis)];
-      value = std::clamp(value, kinematics_.axis_min(axis), kinematics_.axis_max(axis));
-    }
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      joints[axis] = std::clamp(joints[axis], kinematics_.axis_min(axis), kinematics_.axis_max(axis));
     return joints;
   }
   Joints anywhere() {
     Joints joints = ends_[uniform(0, 1) < .5 ? 0 : 1];
-    for (const int axis : {kJ1, kJ2, kJ3, kJ4}) {
-      const double low = kinematics_.axis_min(axis), high = kinematics_.axis_max(axis);
-      joints[static_cast<std::size_t>(axis)] =
-          axis == kJ3 ? high - (high - low) * std::pow(uniform(0, 1), 2) : uniform(low, high);
+    for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4}) {
+      const double low = kinematics_.axis_min(axis);
+      const double high = kinematics_.axis_max(axis);
+      joints[axis] = axis == kJ3 ? high - (high - low) * std::pow(uniform(0, 1), 2) : uniform(low, high);
     }
     return joints;
   }
@@ -88,7 +86,7 @@ std::vector<int> nearest(const CellDescription& cell, const Tree& tree, const Jo
   return indices;
 }
 
-Joints part_way(const Joints& from, const Joints& to, double share) {
+Joints interpolated(const Joints& from, const Joints& to, double share) {
   Joints joints;
   for (std::size_t i = 0; i < kAxisCount; ++i) joints[i] = from[i] + share * (to[i] - from[i]);
   return joints;
@@ -97,35 +95,35 @@ Joints part_way(const Joints& from, const Joints& to, double share) {
 }  // namespace
 
 /// Takes out way-points that are not needed.
-std::vector<Joints> Transit::shortened(std::vector<Joints> way) const {
-  for (std::size_t i = 0; i + 2 < way.size(); ++i)
-    for (std::size_t j = way.size() - 1; j > i + 1; --j) {
-      if ((i == 0 || j + 1 == way.size()) && needs_retract(way[i], way[j])) continue;
-      if (!is_clear(way[i], way[j])) continue;
-      way.erase(way.begin() + static_cast<std::ptrdiff_t>(i) + 1, way.begin() + static_cast<std::ptrdiff_t>(j));
+std::vector<Joints> Transit::shortened(std::vector<Joints> path) const {
+  for (std::size_t i = 0; i + 2 < path.size(); ++i)
+    for (std::size_t j = path.size() - 1; j > i + 1; --j) {
+      if ((i == 0 || j + 1 == path.size()) && needs_retract(path[i], path[j])) continue;
+      if (!is_clear(path[i], path[j])) continue;
+      path.erase(path.begin() + static_cast<std::ptrdiff_t>(i) + 1, path.begin() + static_cast<std::ptrdiff_t>(j));
       break;
     }
-  return way;
+  return path;
 }
 
 std::optional<std::vector<Joints>> Transit::search(const Joints& from, const Joints& to) const {
   if (!is_clear_at(to)) return std::nullopt;
   std::array<Tree, 2> trees{Tree{{from, -1}}, Tree{{to, -1}}};
-  Sampler sampler(reach_.kinematics, from, to);
+  Sampler sampler(reach_.kinematics(), from, to);
   const auto is_passable = [&](const Joints& a, const Joints& b, bool meets_end) {
     return !(meets_end && needs_retract(a, b)) && is_clear(a, b);
   };
-  for (int n = 0; n < kSamples; ++n) {
+  for (int n = 0; n < kMaxSamples; ++n) {
     const int side = n & 1;
     Tree& tree = trees[static_cast<std::size_t>(side)];
     const Tree& other = trees[static_cast<std::size_t>(1 - side)];
     const Joints sample = sampler(n, side, tree);
-    const int parent = nearest(reach_.cell, tree, sample, 1).front();
+    const int parent = nearest(reach_.cell(), tree, sample, 1).front();
     const Joints& start = tree[static_cast<std::size_t>(parent)].joints;
     const auto grown = [&]() -> std::optional<Joints> {
       for (const double share : {1., .5, .2}) {
-        const Joints reached = part_way(start, sample, share);
-        if (!reach_.kinematics.limit_excess(reached).is_inside()) continue;
+        const Joints reached = interpolated(start, sample, share);
+        if (!reach_.kinematics().limit_excess(reached).is_inside()) continue;
         if (side == 0 ? is_passable(start, reached, parent == 0) : is_passable(reached, start, parent == 0))
           return reached;
       }
@@ -134,24 +132,24 @@ std::optional<std::vector<Joints>> Transit::search(const Joints& from, const Joi
     if (!grown) continue;
     const int index = static_cast<int>(tree.size());
     tree.push_back({*grown, parent});
-    for (const int there : nearest(reach_.cell, other, *grown, kJoinsTried)) {
+    for (const int there : nearest(reach_.cell(), other, *grown, kMaxJoins)) {
       const Joints& meeting = other[static_cast<std::size_t>(there)].joints;
       if (side == 0 ? !is_passable(*grown, meeting, there == 0) : !is_passable(meeting, *grown, there == 0)) continue;
-      std::vector<Joints> way;
+      std::vector<Joints> path;
       for (int i = side == 0 ? index : there; i >= 0; i = trees[0][static_cast<std::size_t>(i)].parent)
-        way.push_back(trees[0][static_cast<std::size_t>(i)].joints);
-      std::reverse(way.begin(), way.end());
+        path.push_back(trees[0][static_cast<std::size_t>(i)].joints);
+      std::reverse(path.begin(), path.end());
       for (int i = side == 0 ? there : index; i >= 0; i = trees[1][static_cast<std::size_t>(i)].parent)
-        way.push_back(trees[1][static_cast<std::size_t>(i)].joints);
-      way = shortened(std::move(way));
-      return std::vector<Joints>(way.begin() + 1, way.end() - 1);
+        path.push_back(trees[1][static_cast<std::size_t>(i)].joints);
+      path = shortened(std::move(path));
+      return std::vector<Joints>(path.begin() + 1, path.end() - 1);
     }
   }
   return std::nullopt;
 }
 
 std::optional<std::vector<Joints>> Transit::route_by_search(const Joints& from, const Joints& to) const {
-  if (auto way = route(from, to)) return way;
+  if (auto path = route(from, to)) return path;
   return search(from, to);
 }
 

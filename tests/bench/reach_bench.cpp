@@ -70,8 +70,8 @@ Vector3d beam_in_cone(const Vector3d& normal, double angle_max, std::mt19937& ra
   return -(r * std::cos(turn) * u + r * std::sin(turn) * v + z * normal);
 }
 
-void measure_solutions(const Reach::Implementation& reach, const Amounts& amounts, std::mt19937& random) {
-  const auto& kinematics = reach.kinematics;
+void measure_solutions(const Reach& reach, const Amounts& amounts, std::mt19937& random) {
+  const auto& kinematics = reach.kinematics();
   std::uniform_real_distribution<double> tilt(kinematics.axis_min(kTilt), kinematics.axis_max(kTilt)), turn(-kPi, kPi),
       side(-.03, .03);
   struct Wish {
@@ -98,8 +98,8 @@ void measure_solutions(const Reach::Implementation& reach, const Amounts& amount
 }
 
 /// Each pose by itself: a dot, a table pose and a yaw that put the beam within the cone.
-void measure_single_poses(const Reach::Implementation& reach, const std::vector<Target>& targets,
-                          const Amounts& amounts, std::mt19937& random, AnswerHash& hash) {
+void measure_single_poses(const Reach& reach, const std::vector<Target>& targets, const Amounts& amounts,
+                          std::mt19937& random, AnswerHash& hash) {
   struct Wish {
     const Target* target;
     TablePose table;
@@ -107,26 +107,25 @@ void measure_single_poses(const Reach::Implementation& reach, const std::vector<
     Vector3d beam_O;
   };
   std::vector<Wish> wishes;
-  std::uniform_real_distribution<double> tilt(reach.kinematics.axis_min(kTilt), reach.kinematics.axis_max(kTilt));
+  std::uniform_real_distribution<double> tilt(reach.kinematics().axis_min(kTilt), reach.kinematics().axis_max(kTilt));
   while (wishes.size() < 200'000) {
     const Target& target = targets[wishes.size() % targets.size()];
     const Vector3d beam_O = beam_in_cone(target.face_normal_O, kPi / 4, random);
-    TableSolution solutions[2];
-    if (solve_table(reach.kinematics, tilt(random), beam_O, solutions) == 0) continue;
+    if (solve_table(reach.kinematics(), tilt(random), beam_O).empty()) continue;
     const double a = tilt(random);
-    if (solve_table(reach.kinematics, a, beam_O, solutions) == 0) continue;
-    wishes.push_back({&target, reach.kinematics.table_pose(a, solutions[0].rotation), solutions[0].yaw, beam_O});
+    const TableSolutions solutions = solve_table(reach.kinematics(), a, beam_O);
+    if (solutions.empty()) continue;
+    wishes.push_back({&target, reach.kinematics().table_pose(a, solutions[0].rotation), solutions[0].yaw, beam_O});
   }
   const Joints home{};
   std::size_t clear = 0;
   const double begin = seconds();
   for (std::size_t i = 0; i < amounts.poses; ++i) {
     const Wish& wish = wishes[i % wishes.size()];
-    Joints joints;
-    clear += reach.arm_fits(wish.table, wish.target->position_O, wish.yaw, i & 1 ? Elbow::kPositive : Elbow::kNegative,
-                            home, joints, nullptr) &&
-             reach.clearance.lens_obstruction(wish.target->position_O, wish.beam_O) == Obstruction::kNone &&
-             reach.clearance.beam_obstruction(wish.target->position_O, wish.beam_O) == Obstruction::kNone;
+    const Elbow elbow = i & 1 ? Elbow::kPositive : Elbow::kNegative;
+    clear += reach.arm_joints(wish.table, wish.target->position_O, wish.yaw, elbow, home).has_value() &&
+             reach.clearance().lens_obstruction(wish.target->position_O, wish.beam_O) == Obstruction::kNone &&
+             reach.clearance().beam_obstruction(wish.target->position_O, wish.beam_O) == Obstruction::kNone;
   }
   const double spent = seconds() - begin;
   std::printf("poses, each by itself    %8.2f M/s (%.1f %% clear)\n", 1e-6 * static_cast<double>(amounts.poses) / spent,
@@ -135,7 +134,7 @@ void measure_single_poses(const Reach::Implementation& reach, const std::vector<
 }
 
 /// As reach goes: beam and lens once for a direction, then all tilts, yaws and elbows that give it.
-void measure_directions(const Reach::Implementation& reach, const std::vector<Target>& targets, const Amounts& amounts,
+void measure_directions(const Reach& reach, const std::vector<Target>& targets, const Amounts& amounts,
                         std::mt19937& random, AnswerHash& hash) {
   const Joints home{};
   std::size_t poses = 0, clear = 0;
@@ -143,18 +142,16 @@ void measure_directions(const Reach::Implementation& reach, const std::vector<Ta
   for (std::size_t d = 0; poses < amounts.poses; ++d) {
     const Target& target = targets[d % targets.size()];
     const Vector3d beam_O = beam_in_cone(target.face_normal_O, kPi / 4, random);
-    const bool is_free = reach.clearance.beam_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
-                         reach.clearance.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone;
+    const bool is_free = reach.clearance().beam_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
+                         reach.clearance().lens_obstruction(target.position_O, beam_O) == Obstruction::kNone;
     for (const double tilt : reach.tilts()) {
-      TableSolution solutions[2];
-      const int count = solve_table(reach.kinematics, tilt, beam_O, solutions);
-      poses += static_cast<std::size_t>(2 * count);
-      for (int i = 0; is_free && i < count; ++i) {
-        const TablePose table = reach.kinematics.table_pose(tilt, solutions[i].rotation);
-        for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
-          Joints joints;
-          clear += reach.arm_fits(table, target.position_O, solutions[i].yaw, elbow, home, joints, nullptr);
-        }
+      const TableSolutions solutions = solve_table(reach.kinematics(), tilt, beam_O);
+      poses += 2 * solutions.size();
+      if (!is_free) continue;
+      for (const TableSolution& solution : solutions) {
+        const TablePose table = reach.kinematics().table_pose(tilt, solution.rotation);
+        for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative})
+          clear += reach.arm_joints(table, target.position_O, solution.yaw, elbow, home).has_value();
       }
     }
   }
@@ -164,15 +161,15 @@ void measure_directions(const Reach::Implementation& reach, const std::vector<Ta
   hash.take(static_cast<double>(clear));
 }
 
-void compare_with_rays(const Reach::Implementation& reach, const TexturedMesh& mesh, const std::vector<Target>& targets,
+void compare_with_rays(const Reach& reach, const TexturedMesh& mesh, const std::vector<Target>& targets,
                        std::mt19937& random, AnswerHash& hash) {
-  const RayBundle reference(mesh, reach.cell);
+  const RayBundle reference(mesh, reach.cell());
   const std::size_t count = 20'000;
   std::size_t misses = 0, cautious = 0, touching = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Target& target = targets[i % targets.size()];
     const Vector3d beam_O = beam_in_cone(target.face_normal_O, kPi / 2, random);
-    const bool is_clear = reach.clearance.lens_obstruction(target.position_O, beam_O) == Obstruction::kNone;
+    const bool is_clear = reach.clearance().lens_obstruction(target.position_O, beam_O) == Obstruction::kNone;
     const bool touches = reference.lens_touches(target.position_O, beam_O);
     misses += is_clear && touches;
     touching += touches;
@@ -186,17 +183,16 @@ void compare_with_rays(const Reach::Implementation& reach, const TexturedMesh& m
   hash.take(static_cast<double>(cautious));
 }
 
-void survey(const Reach::Implementation& reach, const std::vector<Target>& targets, const Amounts& amounts,
-            AnswerHash& hash) {
+void survey(const Reach& reach, const std::vector<Target>& targets, const Amounts& amounts, AnswerHash& hash) {
   std::vector<std::size_t> skipped;
   std::map<std::string, std::size_t> reasons;
   const Joints home{};
   const double begin = seconds();
   for (std::size_t i = 0; i < targets.size(); ++i) {
-    SkippedDot why;
-    if (reach.find_pose(targets[i], home, &why)) continue;
+    const PoseSearchResult found = reach.find_pose(targets[i], home);
+    if (found.pose) continue;
     skipped.push_back(i);
-    ++reasons[std::string(why.what)];
+    ++reasons[std::string(found.skipped.what)];
   }
   const double spent = seconds() - begin;
   const auto count = static_cast<double>(targets.size());
@@ -212,8 +208,7 @@ void survey(const Reach::Implementation& reach, const std::vector<Target>& targe
     poses += answer.poses;
     confirmed += !answer.is_reached;
     if (answer.is_reached) {
-      SkippedDot why;
-      reach.find_pose(targets[skipped[s]], home, &why);
+      const SkippedDot why = reach.find_pose(targets[skipped[s]], home).skipped;
       std::printf("  reached after all: %s\n", why.detail.c_str());
     }
   }
@@ -228,7 +223,7 @@ void run(const std::string& file, double size_mm, const Amounts& amounts, Answer
   const TexturedMesh mesh = repair_mesh(place_on_table(load_model(file, load_image_file), placement)).mesh;
   const CellDescription cell = load_cell(find_cell("default"));
   const double begin = seconds();
-  const Reach::Implementation reach(mesh, cell, {});
+  const Reach reach(mesh, cell, {});
   std::printf("%s, %.0f mm: %zu triangles, set up in %.2f s\n", file.c_str(), size_mm, mesh.triangle_count(),
               seconds() - begin);
   std::mt19937 random(11);

@@ -15,12 +15,13 @@ struct Reached {
 };
 
 Reached reached(const TexturedMesh& mesh, const CellDescription& cell, const DotSequence& dots) {
-  const Reach::Implementation reach(mesh, cell, {});
+  const Reach reach(mesh, cell, {});
   Reached result;
   for (std::uint32_t i = 0; i < dots.dots.size(); ++i) {
-    SkippedDot why;
-    why.dot_index = i;
-    if (!reach.find_pose(target_of(dots.dots[i]), {}, &why)) result.skipped.push_back(why);
+    PoseSearchResult found = reach.find_pose(target_of(dots.dots[i]), {});
+    if (found.pose) continue;
+    found.skipped.dot_index = i;
+    result.skipped.push_back(std::move(found.skipped));
   }
   result.share = 1 - static_cast<double>(result.skipped.size()) / static_cast<double>(dots.dots.size());
   return result;

@@ -169,24 +169,24 @@ TEST(Dose, PowerAndPulseStayWithinTheLaser) {
   const CellDescription cell = default_cell();
   const double pitch_m = .0254 / 100, full_j = full_energy_j(cell, pitch_m);
   const auto& laser = cell.laser;
-  Dose dose;
-  std::string detail;
   for (double energy_j = laser.power_min_w * laser.pulse_min_s * 1.0001;
        energy_j < laser.power_max_w * laser.pulse_max_s; energy_j *= 1.3) {
-    ASSERT_TRUE(find_dose(cell, pitch_m, energy_j / full_j, dose, detail)) << energy_j;
-    EXPECT_NEAR(static_cast<double>(dose.power_w) * static_cast<double>(dose.pulse_s) / energy_j, 1, 1e-6);
-    EXPECT_LE(dose.power_w, static_cast<float>(laser.power_max_w));
-    EXPECT_GE(dose.power_w, static_cast<float>(laser.power_min_w));
-    EXPECT_LE(dose.pulse_s, static_cast<float>(laser.pulse_max_s));
-    EXPECT_GE(dose.pulse_s, static_cast<float>(laser.pulse_min_s));
+    const auto dose = find_dose(cell, pitch_m, energy_j / full_j).dose;
+    ASSERT_TRUE(dose.has_value()) << energy_j;
+    EXPECT_NEAR(static_cast<double>(dose->power_w) * static_cast<double>(dose->pulse_s) / energy_j, 1, 1e-6);
+    EXPECT_LE(dose->power_w, static_cast<float>(laser.power_max_w));
+    EXPECT_GE(dose->power_w, static_cast<float>(laser.power_min_w));
+    EXPECT_LE(dose->pulse_s, static_cast<float>(laser.pulse_max_s));
+    EXPECT_GE(dose->pulse_s, static_cast<float>(laser.pulse_min_s));
     const double power_w = energy_j / laser.pulse_s;
     if (power_w > laser.power_min_w && power_w < laser.power_max_w) {
-      EXPECT_EQ(dose.pulse_s, static_cast<float>(laser.pulse_s));
+      EXPECT_EQ(dose->pulse_s, static_cast<float>(laser.pulse_s));
     }
   }
   for (const double level : {0., -1., std::nan(""), 1e9}) {
-    EXPECT_FALSE(find_dose(cell, pitch_m, level, dose, detail)) << level;
-    EXPECT_FALSE(detail.empty());
+    const DoseResult result = find_dose(cell, pitch_m, level);
+    EXPECT_FALSE(result.dose.has_value()) << level;
+    EXPECT_FALSE(result.refusal.empty());
   }
 }
 
@@ -232,16 +232,16 @@ TEST(Approach, IsClearFromWhereverTheCellWasStopped) {
 
 TEST(Approach, FromHomeAndFromNonsense) {
   const auto& [cell, options, mesh, dots, reach, plan] = PlannedBall::get();
-  EXPECT_NO_THROW(plan_approach(reach, plan.program, 0, home_of(cell)));
-  Joints outside = home_of(cell);
+  EXPECT_NO_THROW(plan_approach(reach, plan.program, 0, home_joints(cell)));
+  Joints outside = home_joints(cell);
   outside[kJ1] = 4;
   EXPECT_THROW(plan_approach(reach, plan.program, 0, outside), InputError);
   outside[kJ1] = std::nan("");
   EXPECT_THROW(plan_approach(reach, plan.program, 0, outside), InputError);
-  EXPECT_THROW(plan_approach(reach, plan.program, plan.program.exposures.size(), home_of(cell)), InputError);
+  EXPECT_THROW(plan_approach(reach, plan.program, plan.program.exposures.size(), home_joints(cell)), InputError);
   // A pose in which the lens is inside the ball: no way out is promised.
   const Kinematics kinematics(cell);
-  Joints inside = home_of(cell);
+  Joints inside = home_joints(cell);
   const TablePose table = kinematics.table_pose(0, 0);
   ASSERT_TRUE(kinematics.solve_arm(table.to_W({.07, 0, -.04}), 0, Elbow::kPositive, inside));
   EXPECT_THROW(plan_approach(reach, plan.program, 0, inside), InputError);

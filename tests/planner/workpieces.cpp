@@ -97,10 +97,4 @@ DotSequence scatter(const TexturedMesh& mesh, double pitch_m, unsigned seed) {
   return dots;
 }
 
-Joints home_of(const CellDescription& cell) {
-  Joints home;
-  for (std::size_t i = 0; i < kAxisCount; ++i) home[i] = cell.axes[i].home;
-  return home;
-}
-
 }  // namespace hilbrush

@@ -24,6 +24,4 @@ TexturedMesh drilled_block();
 /// Dots all over the surface, in an order whose steps are short, with interpolated vertex normals.
 DotSequence scatter(const TexturedMesh& mesh, double pitch_m, unsigned seed = 1);
 
-Joints home_of(const CellDescription& cell);
-
 }  // namespace hilbrush

@@ -21,7 +21,7 @@ TEST(TimeModel, TrapezoidClosedForms) {
 
 TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
   const CellDescription cell = default_cell();
-  const Joints home = home_of(cell);
+  const Joints home = home_joints(cell);
   EXPECT_EQ(move_s(cell, home, home), 0);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0, 1);
@@ -45,7 +45,7 @@ TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
 
 TEST(TimeModel, JointsDuringAMoveKeepSpeedAndAcceleration) {
   const CellDescription cell = default_cell();
-  Joints from = home_of(cell), to = from;
+  Joints from = home_joints(cell), to = from;
   to[kJ1] -= 1, to[kJ3] -= .2, to[kRotation] += 2;
   const double dt = 1e-4;
   for (double t = dt; t < 1; t += dt) {
@@ -61,7 +61,7 @@ TEST(TimeModel, JointsDuringAMoveKeepSpeedAndAcceleration) {
 TEST(TimeModel, SettleGrowsUpToItsCap) {
   const CellDescription cell = default_cell();
   const auto& timing = cell.timing;
-  const Joints from = home_of(cell);
+  const Joints from = home_joints(cell);
   EXPECT_EQ(settle_s(cell, from, from), timing.settle_min_s);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     Joints to = from;
@@ -74,7 +74,7 @@ TEST(TimeModel, SettleGrowsUpToItsCap) {
 
 TEST(TimeModel, EstimateAddsUpMovesSettlesAndPulses) {
   const CellDescription cell = default_cell();
-  const Joints home = home_of(cell);
+  const Joints home = home_joints(cell);
   ExposureProgram program;
   Exposure exposure;
   exposure.joints = home;

@@ -109,7 +109,7 @@ TEST(PoseSearch, PreferredIncidenceIsKeptWhereItCanBe) {
       const double from_smooth = std::acos(std::min(1., -kinematics.tool_pose(exposure.joints).beam_O.dot(normal_O)));
       if (from_smooth <= std::max(options.preferred_incidence, 5 * kDegree) + 1e-6) continue;
       // Only where the search for a single pose, which prefers small angles, finds none within it either.
-      const auto pose = reach.implementation().find_pose(target_of(dot), home_of(cup.cell));
+      const auto pose = reach.find_pose(target_of(dot), home_joints(cup.cell)).pose;
       ASSERT_TRUE(pose);
       EXPECT_GT(pose->from_smooth, from_smooth - 5 * kDegree) << "preferred " << preferred_deg;
     }

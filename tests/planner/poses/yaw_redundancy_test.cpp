@@ -43,11 +43,11 @@ struct Rows {
   }
 
   /// Five degrees off the normal of the block's top, the table tilted to meet the beam.
-  std::vector<Joints> nominal(const Reach::Implementation& reach) {
+  std::vector<Joints> nominal(const Reach& reach) {
     const double tilt = std::numbers::pi / 2 - cell.arm.beam_depression;
-    TableSolution solutions[2];
     const Eigen::Vector3d beam_O(std::sin(kNominal), 0, -std::cos(kNominal));
-    EXPECT_GT(solve_table(reach.kinematics, tilt, beam_O, solutions), 0);
+    const TableSolutions solutions = solve_table(reach.kinematics(), tilt, beam_O);
+    EXPECT_FALSE(solutions.empty());
     station = {tilt, solutions[0].rotation, solutions[0].yaw, Elbow::kPositive};
     std::vector<Joints> joints;
     for (const Dot& dot : dots.dots) {
@@ -68,7 +68,7 @@ double path_s(const CellDescription& cell, const std::vector<Joints>& path) {
 
 TEST(YawSlack, TurnsTheToolAlongRowsThatTheArmAloneIsSlowAt) {
   Rows rows(2.2e-4);
-  const Reach::Implementation reach(rows.mesh, rows.cell, rows.options);
+  const Reach reach(rows.mesh, rows.cell, rows.options);
   const AimedDots dots(reach, rows.dots, rows.dot_indices);
   const std::vector<Joints> before = rows.nominal(reach);
   std::vector<Joints> after = before;
@@ -77,13 +77,13 @@ TEST(YawSlack, TurnsTheToolAlongRowsThatTheArmAloneIsSlowAt) {
 
   double widest = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {
-    const ToolPose tool = reach.kinematics.tool_pose(after[i]);
+    const ToolPose tool = reach.kinematics().tool_pose(after[i]);
     EXPECT_LT((tool.focus_O - rows.dots.dots[i].position_O).norm(), 1e-9);
     EXPECT_GE(-tool.beam_O.z(), std::cos(kept_incidence(rows.options)) - 1e-9);
-    EXPECT_TRUE(reach.kinematics.limit_excess(after[i]).is_inside());
+    EXPECT_TRUE(reach.kinematics().limit_excess(after[i]).is_inside());
     EXPECT_EQ(after[i][kTilt], before[i][kTilt]);
     EXPECT_EQ(after[i][kRotation], before[i][kRotation]);
-    widest = std::max(widest, std::abs(reach.kinematics.yaw(after[i]) - reach.kinematics.yaw(before[i])));
+    widest = std::max(widest, std::abs(reach.kinematics().yaw(after[i]) - reach.kinematics().yaw(before[i])));
   }
   EXPECT_GT(widest, .3 * kDegree);
   EXPECT_LT(widest, 8 * kDegree);
@@ -91,7 +91,7 @@ TEST(YawSlack, TurnsTheToolAlongRowsThatTheArmAloneIsSlowAt) {
 
 TEST(YawSlack, StaysNearTheNormalWhereThatIsWorthMore) {
   Rows rows(2.2e-4);
-  const Reach::Implementation reach(rows.mesh, rows.cell, rows.options);
+  const Reach reach(rows.mesh, rows.cell, rows.options);
   const AimedDots dots(reach, rows.dots, rows.dot_indices);
   AimCosts costs = aim_costs(rows.options);
   costs.incidence_s = 100;
@@ -99,14 +99,14 @@ TEST(YawSlack, StaysNearTheNormalWhereThatIsWorthMore) {
   std::vector<Joints> after = before;
   use_yaw_slack(dots, costs, rows.station, rows.tour, after);
   for (std::size_t i = 0; i < after.size(); ++i)
-    EXPECT_GE(-reach.kinematics.tool_pose(after[i]).beam_O.z(), std::cos(kNominal) - 1e-6) << i;
+    EXPECT_GE(-reach.kinematics().tool_pose(after[i]).beam_O.z(), std::cos(kNominal) - 1e-6) << i;
 }
 
 TEST(YawSlack, LongToursAreWalkedInBlocksWithoutASeam) {
   Rows rows(1e-4);
   const std::vector<std::uint32_t> once = rows.tour;
   while (rows.tour.size() < 20'000) rows.tour.insert(rows.tour.end(), once.begin(), once.end());
-  const Reach::Implementation reach(rows.mesh, rows.cell, rows.options);
+  const Reach reach(rows.mesh, rows.cell, rows.options);
   const AimedDots dots(reach, rows.dots, rows.dot_indices);
   const std::vector<Joints> one = rows.nominal(reach);
   std::vector<Joints> before;
@@ -116,7 +116,7 @@ TEST(YawSlack, LongToursAreWalkedInBlocksWithoutASeam) {
   EXPECT_LE(path_s(rows.cell, after), path_s(rows.cell, before));
   for (std::size_t i = 1; i < after.size(); ++i)
     if (i % once.size() != 0) {
-      EXPECT_LT(std::abs(reach.kinematics.yaw(after[i]) - reach.kinematics.yaw(after[i - 1])), 1 * kDegree) << i;
+      EXPECT_LT(std::abs(reach.kinematics().yaw(after[i]) - reach.kinematics().yaw(after[i - 1])), 1 * kDegree) << i;
     }
 }
 

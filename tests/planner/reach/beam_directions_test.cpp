@@ -32,23 +32,21 @@ TEST(BeamDirections, LieEvenlyOverTheSphere) {
 /// Rays of Embree, the independent check and a fine grid of tilts, apart from whatever reach does to be fast.
 class Reference {
  public:
-  Reference(const TexturedMesh& mesh, const Reach::Implementation& reach)
-      : reach_(reach), bundle_(mesh, reach.cell), check_(mesh, reach.cell) {}
+  Reference(const TexturedMesh& mesh, const Reach& reach)
+      : reach_(reach), bundle_(mesh, reach.cell()), check_(mesh, reach.cell()) {}
 
   /// Whether the direction hits the target, everything wider by `wider_m`.
   bool hits(const Target& target, const Eigen::Vector3d& beam_O, double wider_m) const {
     if (-beam_O.dot(target.face_normal_O) < reach_.cos_max_incidence()) return false;
     if (bundle_.lens_touches(target.position_O, beam_O, wider_m)) return false;
-    const auto& kinematics = reach_.kinematics;
+    const auto& kinematics = reach_.kinematics();
     const double low = kinematics.axis_min(kTilt), high = kinematics.axis_max(kTilt);
     constexpr int kTilts = 110;
     for (int a = 0; a <= kTilts; ++a) {
       const double tilt = low + (high - low) * a / kTilts;
-      TableSolution solutions[2];
-      const int count = solve_table(kinematics, tilt, beam_O, solutions);
-      for (int s = 0; s < count; ++s)
+      for (const TableSolution& solution : solve_table(kinematics, tilt, beam_O))
         for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative})
-          if (is_good(target, kinematics.table_pose(tilt, solutions[s].rotation), solutions[s].yaw, elbow, wider_m))
+          if (is_good(target, kinematics.table_pose(tilt, solution.rotation), solution.yaw, elbow, wider_m))
             return true;
     }
     return false;
@@ -56,7 +54,7 @@ class Reference {
 
  private:
   bool is_good(const Target& target, const TablePose& table, double yaw, Elbow elbow, double wider_m) const {
-    const auto& kinematics = reach_.kinematics;
+    const auto& kinematics = reach_.kinematics();
     Joints joints{};
     if (!kinematics.solve_arm(table.to_W(target.position_O), yaw, elbow, joints)) return false;
     joints[kTilt] = table.tilt;
@@ -66,7 +64,7 @@ class Reference {
            check_.beam_fault(check_.X_OF(joints), 1e-5).empty();
   }
 
-  const Reach::Implementation& reach_;
+  const Reach& reach_;
   RayBundle bundle_;
   CheckCell check_;
 };
@@ -76,7 +74,7 @@ TEST(BeamDirections, AreAllThatHitADotAndNoOthers) {
   const BeamDirections directions(9 * kDegree);
   std::size_t looks = 0, hitting = 0, misses = 0, cautious = 0;
   for (const TexturedMesh& mesh : {small_cup(), drilled_block(), ball(.03)}) {
-    const Reach::Implementation reach(mesh, default_cell(), {});
+    const Reach reach(mesh, default_cell(), {});
     const Reference reference(mesh, reach);
     const DotSequence dots = scatter(mesh, 2e-3, kSeed);
     for (std::size_t i = 0; i < dots.dots.size(); i += dots.dots.size() / 40) {

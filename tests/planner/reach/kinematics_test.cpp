@@ -6,18 +6,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <random>
 #include <string>
 
 #include "planner/check/check_cell.h"
 #include "planner/reach/reach.h"
+#include "sampling/base/angles.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+constexpr double kPi = kTurn / 2;
 
 Joints random_joints(const CellDescription& cell, std::mt19937& random) {
   std::uniform_real_distribution<double> share(0, 1);
@@ -54,7 +54,7 @@ TEST(Kinematics, InverseOfForwardIsTheSamePose) {
       ASSERT_EQ(elbow == Elbow::kPositive, found[kJ2] > 0);
       if ((joints[kJ2] > 0) == (elbow == Elbow::kPositive)) {
         ASSERT_NEAR(found[kJ2], joints[kJ2], 1e-9) << "pose " << n;
-        ASSERT_NEAR(std::remainder(found[kJ1] - joints[kJ1], 2 * kPi), 0, 1e-9) << "pose " << n;
+        ASSERT_NEAR(std::remainder(found[kJ1] - joints[kJ1], kTurn), 0, 1e-9) << "pose " << n;
       }
     }
   }
@@ -79,7 +79,7 @@ TEST(Kinematics, RatesOverYawAreThoseOfTheInverse) {
     ASSERT_TRUE(kinematics.solve_arm(focus_W, kinematics.yaw(joints) + kStep, elbow, after));
     const Joints rates = kinematics.per_yaw(joints);
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      EXPECT_NEAR(rates[axis], std::remainder(after[axis] - before[axis], 2 * kPi) / (2 * kStep), 1e-4)
+      EXPECT_NEAR(rates[axis], std::remainder(after[axis] - before[axis], kTurn) / (2 * kStep), 1e-4)
           << kAxisNames[axis] << ", pose " << n << ", seed " << kSeed;
   }
 }
@@ -95,15 +95,13 @@ TEST(Kinematics, InverseOfTheWholeChainIsTheSameBeamOnTheSameDot) {
     const Joints joints = random_joints(cell, random);
     if (std::abs(std::sin(joints[kTilt])) < 1e-3) continue;  // A = 0: C turns about the same axis as yaw
     const ToolPose tool = kinematics.tool_pose(joints);
-    TableSolution solutions[2];
-    const int count = solve_table(kinematics, joints[kTilt], tool.beam_O, solutions);
-    for (int s = 0; s < count; ++s)
+    for (const TableSolution& solution : solve_table(kinematics, joints[kTilt], tool.beam_O))
       for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
-        const TablePose table = kinematics.table_pose(joints[kTilt], solutions[s].rotation);
+        const TablePose table = kinematics.table_pose(joints[kTilt], solution.rotation);
         Joints found{};
         found[kTilt] = joints[kTilt];
-        found[kRotation] = solutions[s].rotation;
-        if (!kinematics.solve_arm(table.to_W(tool.focus_O), solutions[s].yaw, elbow, found)) continue;
+        found[kRotation] = solution.rotation;
+        if (!kinematics.solve_arm(table.to_W(tool.focus_O), solution.yaw, elbow, found)) continue;
         ++solved;
         const ToolPose again = kinematics.tool_pose(found);
         ASSERT_LT((again.focus_O - tool.focus_O).norm(), 1e-9) << "pose " << n << ", seed " << kSeed;
@@ -154,27 +152,26 @@ TEST(Kinematics, TableSolutionsPointTheBeam) {
   const Kinematics kinematics(cell);
   std::mt19937 random(13);
   std::normal_distribution<double> normal;
-  int solved = 0;
+  std::size_t solved = 0;
   for (int n = 0; n < 20'000; ++n) {
     const Eigen::Vector3d beam_O = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
-    TableSolution solutions[2];
     const double tilt = .02 + 1.7 * std::abs(std::remainder(normal(random), 1));
-    const int count = solve_table(kinematics, tilt, beam_O, solutions);
-    solved += count;
-    for (int s = 0; s < count; ++s) {
-      const TablePose table = kinematics.table_pose(tilt, solutions[s].rotation);
-      const Eigen::Vector3d found = table.R_WO.transpose() * kinematics.beam_W(solutions[s].yaw);
+    const TableSolutions solutions = solve_table(kinematics, tilt, beam_O);
+    solved += solutions.size();
+    for (const TableSolution& solution : solutions) {
+      const TablePose table = kinematics.table_pose(tilt, solution.rotation);
+      const Eigen::Vector3d found = table.R_WO.transpose() * kinematics.beam_W(solution.yaw);
       ASSERT_LT((found - beam_O).norm(), 1e-7) << "direction " << n;
     }
   }
-  EXPECT_GT(solved, 5'000);
+  EXPECT_GT(solved, 5'000U);
 }
 
 TEST(Kinematics, LimitsNameTheWorstAxisAndAmount) {
   CellDescription cell = default_cell();
   cell.limit_margin = 0;
   const Kinematics kinematics(cell);
-  Joints joints = home_of(cell);
+  Joints joints = home_joints(cell);
   EXPECT_TRUE(kinematics.limit_excess(joints).is_inside());
   joints[kJ2] = cell.axes[kJ2].max + .05;
   EXPECT_EQ(kinematics.limit_excess(joints).axis, kJ2);
@@ -182,7 +179,7 @@ TEST(Kinematics, LimitsNameTheWorstAxisAndAmount) {
   joints[kJ3] = cell.axes[kJ3].min - .1;  // a third of its range
   EXPECT_EQ(kinematics.limit_excess(joints).axis, kJ3);
   EXPECT_NEAR(kinematics.limit_excess(joints).amount, .1, 1e-12);
-  joints = home_of(cell);
+  joints = home_joints(cell);
   joints[kJ2] = 0;  // straight: singular
   EXPECT_FALSE(kinematics.limit_excess(joints).is_inside());
 }
@@ -194,9 +191,9 @@ TEST(Kinematics, WindingStaysNearAndInsideTheLimits) {
   std::uniform_real_distribution<double> angle(-kPi, kPi), reference(-80, 80);
   for (int n = 0; n < 10'000; ++n) {
     const double a = angle(random), near = reference(random);
-    for (const int axis : {kJ4, kRotation}) {
+    for (const std::size_t axis : {kJ4, kRotation}) {
       const double unwrapped = kinematics.unwrap_near(axis, a, near);
-      ASSERT_NEAR(std::remainder(unwrapped - a, 2 * kPi), 0, 1e-9);
+      ASSERT_NEAR(std::remainder(unwrapped - a, kTurn), 0, 1e-9);
       ASSERT_LE(unwrapped, kinematics.axis_max(axis));
       ASSERT_GE(unwrapped, kinematics.axis_min(axis));
       const double inside = std::clamp(near, kinematics.axis_min(axis) + kPi, kinematics.axis_max(axis) - kPi);

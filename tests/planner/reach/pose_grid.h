@@ -1,12 +1,12 @@
 #pragma once
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 
 #include "planner/reach/reach.h"
+#include "sampling/base/angles.h"
 
-/// Brute force: every pose of a grid over tilt, rotation and yaw with either elbow, looked at by the same rules as
-/// planning's but found in another way. Confirms that a dot which reach gave up is out of reach.
+/// Brute force: every pose of a grid over tilt, rotation and yaw with either elbow, checked by the same rules as
+/// planning's but found in another way. Confirms that a dot that reach gave up is out of reach.
 namespace hilbrush {
 
 struct PoseGridAnswer {
@@ -14,29 +14,28 @@ struct PoseGridAnswer {
   std::size_t poses = 0;  ///< within the cone
 };
 
-inline PoseGridAnswer search_pose_grid(const Reach::Implementation& reach, const Target& target, double step) {
-  const auto& kinematics = reach.kinematics;
+inline PoseGridAnswer search_pose_grid(const Reach& reach, const Target& target, double step) {
+  const auto& kinematics = reach.kinematics();
   PoseGridAnswer answer;
-  const int turns = static_cast<int>(std::ceil(2 * std::numbers::pi / step));
+  const int turns = static_cast<int>(std::ceil(kTurn / step));
   const double low = kinematics.axis_min(kTilt), high = kinematics.axis_max(kTilt);
   const int tilts = static_cast<int>(std::ceil((high - low) / step));
   const Joints reference{};
   for (int a = 0; a <= tilts; ++a)
     for (int c = 0; c < turns; ++c) {
-      const double rotation = std::remainder(c * 2 * std::numbers::pi / turns, 2 * std::numbers::pi);
+      const double rotation = std::remainder(c * kTurn / turns, kTurn);
       const TablePose table = kinematics.table_pose(low + (high - low) * a / tilts,
                                                     kinematics.unwrap_near(kRotation, rotation, reference[kRotation]));
       for (int y = 0; y < turns; ++y) {
-        const double yaw = y * 2 * std::numbers::pi / turns;
+        const double yaw = y * kTurn / turns;
         const Eigen::Vector3d beam_O = table.R_WO.transpose() * kinematics.beam_W(yaw);
         if (-beam_O.dot(target.face_normal_O) < reach.cos_max_incidence()) continue;
         ++answer.poses;
-        Joints joints;
         const auto fits = [&](Elbow elbow) {
-          return reach.arm_fits(table, target.position_O, yaw, elbow, reference, joints, nullptr);
+          return reach.arm_joints(table, target.position_O, yaw, elbow, reference).has_value();
         };
-        if (reach.clearance.beam_obstruction(target.position_O, beam_O) != Obstruction::kNone ||
-            reach.clearance.lens_obstruction(target.position_O, beam_O) != Obstruction::kNone)
+        if (reach.clearance().beam_obstruction(target.position_O, beam_O) != Obstruction::kNone ||
+            reach.clearance().lens_obstruction(target.position_O, beam_O) != Obstruction::kNone)
           continue;
         if (!fits(Elbow::kPositive) && !fits(Elbow::kNegative)) continue;
         answer.is_reached = true;

@@ -38,15 +38,15 @@ TEST(Transit, WaysBetweenRandomPosesAreClear) {
   constexpr unsigned kSeed = 51;
   for (const CellDescription& cell : {default_cell(), low_cell()}) {
     const TexturedMesh mesh = ball(.03);
-    const Reach::Implementation reach(mesh, cell, {});
+    const Reach reach(mesh, cell, {});
     const Transit transit(reach);
     const CheckCell check(mesh, cell);
     const DotSequence dots = scatter(mesh, 3e-3, kSeed);
     std::mt19937 random(kSeed);
-    Joints now = home_of(cell);
+    Joints now = home_joints(cell);
     std::size_t found = 0, tried = 0;
     for (int n = 0; n < 40; ++n) {
-      const auto pose = reach.find_pose(target_of(dots.dots[random() % dots.dots.size()]), now);
+      const auto pose = reach.find_pose(target_of(dots.dots[random() % dots.dots.size()]), now).pose;
       if (!pose) continue;
       ++tried;
       const auto way = transit.route_by_search(now, pose->joints);
@@ -66,15 +66,15 @@ TEST(Transit, WaysBetweenRandomPosesAreClear) {
 TEST(Transit, TheSearchFindsWhatSimpleWaysMiss) {
   const CellDescription cell = low_cell();
   const TexturedMesh mesh = ball(.03);
-  const Reach::Implementation reach(mesh, cell, {});
+  const Reach reach(mesh, cell, {});
   const Transit transit(reach);
   const DotSequence dots = scatter(mesh, 3e-3);
   std::size_t simple = 0, searched = 0;
   for (std::size_t i = 0; i < dots.dots.size(); i += 29) {
-    const auto pose = reach.find_pose(target_of(dots.dots[i]), home_of(cell));
+    const auto pose = reach.find_pose(target_of(dots.dots[i]), home_joints(cell)).pose;
     if (!pose) continue;
-    simple += transit.route(home_of(cell), pose->joints).has_value();
-    searched += transit.route_by_search(home_of(cell), pose->joints).has_value();
+    simple += transit.route(home_joints(cell), pose->joints).has_value();
+    searched += transit.route_by_search(home_joints(cell), pose->joints).has_value();
   }
   EXPECT_GE(searched, simple);
   EXPECT_GT(searched, 5U);
@@ -83,24 +83,24 @@ TEST(Transit, TheSearchFindsWhatSimpleWaysMiss) {
 TEST(Transit, SameWayEachTime) {
   const CellDescription cell = low_cell();
   const TexturedMesh mesh = ball(.03);
-  const Reach::Implementation reach(mesh, cell, {});
-  const auto pose = reach.find_pose({{.03, 0, .03}, {1, 0, 0}, {1, 0, 0}}, home_of(cell));
+  const Reach reach(mesh, cell, {});
+  const auto pose = reach.find_pose({{.03, 0, .03}, {1, 0, 0}, {1, 0, 0}}, home_joints(cell)).pose;
   ASSERT_TRUE(pose);
-  EXPECT_EQ(Transit(reach).route_by_search(home_of(cell), pose->joints),
-            Transit(reach).route_by_search(home_of(cell), pose->joints));
+  EXPECT_EQ(Transit(reach).route_by_search(home_joints(cell), pose->joints),
+            Transit(reach).route_by_search(home_joints(cell), pose->joints));
 }
 
 TEST(Transit, NoWayLeadsIntoTheObject) {
   const CellDescription cell = default_cell();
   const TexturedMesh mesh = ball(.03);
-  const Reach::Implementation reach(mesh, cell, {});
+  const Reach reach(mesh, cell, {});
   const Transit transit(reach);
-  Joints inside = home_of(cell);
-  const TablePose table = reach.kinematics.table_pose(0, 0);
-  ASSERT_TRUE(reach.kinematics.solve_arm(table.to_W({.07, 0, -.04}), 0, Elbow::kPositive, inside));
+  Joints inside = home_joints(cell);
+  const TablePose table = reach.kinematics().table_pose(0, 0);
+  ASSERT_TRUE(reach.kinematics().solve_arm(table.to_W({.07, 0, -.04}), 0, Elbow::kPositive, inside));
   EXPECT_FALSE(transit.is_clear_at(inside));
-  EXPECT_FALSE(transit.route_by_search(home_of(cell), inside));
-  EXPECT_FALSE(transit.is_clear(home_of(cell), inside));
+  EXPECT_FALSE(transit.route_by_search(home_joints(cell), inside));
+  EXPECT_FALSE(transit.is_clear(home_joints(cell), inside));
 }
 
 }  // namespace
