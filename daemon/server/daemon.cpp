@@ -10,6 +10,8 @@
 #include "daemon/server/audit_log.h"
 #include "daemon/server/cell_controller.h"
 #include "daemon/server/cell_thread.h"
+#include "daemon/server/job_painting.h"
+#include "daemon/server/job_planning.h"
 #include "daemon/server/job_queue.h"
 #include "daemon/server/job_store.h"
 #include "daemon/server/lock_file.h"
@@ -63,8 +65,10 @@ struct Daemon::Implementation {
   PostToSocketThread post{[this](std::function<void()> task) { server.post(std::move(task)); }};
   CellThread thread;
   PipelineChildren children;
-  CellController desk;
-  JobQueue book;
+  CellController controller;
+  JobQueue queue;
+  JobPlanning planning;
+  JobPainting painting;
   MethodTable methods;
   bool is_ending = false;  ///< the socket thread's
 
@@ -82,23 +86,27 @@ struct Daemon::Implementation {
         thread(*devices, description, post),
         children(given.pipeline,
                  ChildLimits{.silence_s = given.pipeline_silence_s, .resident_bytes = given.pipeline_memory_mb << 20}),
-        desk(thread, *devices, description),
-        book({made_folder(state / "jobs"), cell_file}, store, desk, thread, children, description, post),
-        methods(book, desk, audit, [this] { return info(); }) {
-    desk.on_own_stop = [this](const std::string& reason) {
+        controller(thread, *devices, description),
+        queue(made_folder(state / "jobs"), store),
+        planning(queue, children, description, cell_file, post),
+        painting(queue, controller, thread, children, description, post),
+        methods({queue, planning, painting}, controller, audit, [this] { return info(); }) {
+    controller.on_own_stop = [this](const std::string& reason) {
       Peer self;
       self.uid = ::geteuid();
       self.pid = ::getpid();
       self.user = "hilbrushd";
       audit.record(self, "cell.stop", Json::object(), reason);
     };
-    book.on_change = [this](const Job& job) { server.notify(job); };
-    if (const std::string found = book.restore(); !found.empty()) notice += (notice.empty() ? "" : "; ") + found;
-    server.listen(options.socket, {methods, book, access});
+    queue.on_change = [this](const Job& job) { server.notify(job); };
+    if (const std::string found = queue.restore(); !found.empty()) notice += (notice.empty() ? "" : "; ") + found;
+    painting.restore();
+    planning.plan_next();
+    server.listen(options.socket, {methods, queue, access});
     if (const auto& tcp = options.settings.tcp)
-      tcp_address = tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, book, access}));
+      tcp_address = tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, queue, access}));
     constexpr double kLookS = .05;
-    server.every(kLookS, [this] { desk.look_at_devices(); });
+    server.every(kLookS, [this] { controller.look_at_devices(); });
   }
 
   Json info() const {
@@ -114,20 +122,21 @@ struct Daemon::Implementation {
             {"pipeline_silence_s", options.pipeline_silence_s},
             {"pipeline_memory_mb", options.pipeline_memory_mb},
             {"clients", server.client_count()},
-            {"jobs", book.jobs().size()},
-            {"store_fault", book.store_fault().empty() ? Json(nullptr) : Json(book.store_fault())},
+            {"jobs", queue.jobs().size()},
+            {"store_fault", queue.store_fault().empty() ? Json(nullptr) : Json(queue.store_fault())},
             {"journal_window", Journal::kWindow}};
   }
 
   /// Laser off first; then the executor is waited for, so that the job's last state is kept.
   void end() {
     if (std::exchange(is_ending, true)) return;
-    desk.stop("the daemon ends");
-    book.shut_down();
+    controller.stop("the daemon ends");
+    planning.shut_down();
+    painting.shut_down();
     constexpr double kPeriodS = 0.01;
     constexpr auto kPatience = std::chrono::seconds(10);
     server.poll(kPeriodS, [this, deadline = std::chrono::steady_clock::now() + kPatience] {
-      if ((thread.is_busy() || book.is_painting()) && std::chrono::steady_clock::now() < deadline) return false;
+      if ((thread.is_busy() || painting.is_painting()) && std::chrono::steady_clock::now() < deadline) return false;
       server.end_run();
       return true;
     });

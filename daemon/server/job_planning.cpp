@@ -1,31 +1,126 @@
-#include <filesystem>
+#include "daemon/server/job_planning.h"
 
-#include "daemon/server/job_queue.h"
+#include <algorithm>
+#include <utility>
+
+#include "config/cell_file.h"
+#include "config/job_settings.h"
 #include "daemon/server/model_copy.h"
 #include "sampling/base/input_error.h"
 
-/// The part of JobQueue that plans: a job's files are listed, copied and planned by children, one job at a time.
 namespace hilbrush {
+namespace {
 
 namespace fs = std::filesystem;
 
-void JobQueue::plan_next() {
-  if (planning_ || is_ending_) return;
-  const auto waiting = queue();
+/// A job's "cell": the daemon's own, or, for a dry run, another shipped one by name.
+std::string cell_of(const SubmitOrder& order, const JobSettings& settings, const fs::path& cell_file,
+                    const CellDescription& description) {
+  if (!order.settings.contains("cell") || settings.cell == description.name) return cell_file.string();
+  const auto refuse = [](const std::string& sentence) { throw RpcFault{kRpcBadInput, sentence, "$.settings.cell"}; };
+  if (settings.cell.find('/') != std::string::npos || settings.cell.ends_with(".json"))
+    refuse("a job names a cell, it does not bring one");
+  if (!order.dry_run)
+    refuse("this daemon runs cell \"" + description.name + "\"; only a dry run can be for another one");
+  return find_cell(settings.cell).string();
+}
+
+bool is_same_order(const Job& a, const Job& b) {
+  return a.model == b.model && a.settings == b.settings && a.dry_run == b.dry_run && a.copies == b.copies;
+}
+
+bool is_unplanned(const Job& job) {
+  return job.state == JobState::kQueued || job.state == JobState::kPlanning;
+}
+
+}  // namespace
+
+JobPlanning::JobPlanning(JobQueue& queue, PipelineChildren& children, const CellDescription& description,
+                         fs::path cell_file, PostToSocketThread post)
+    : queue_(queue),
+      children_(children),
+      description_(description),
+      cell_file_(std::move(cell_file)),
+      post_(std::move(post)) {}
+
+Job JobPlanning::requested_job(const SubmitOrder& order, const Peer& peer) const {
+  if (!order.model.is_absolute()) throw RpcFault{kRpcBadParams, "must be an absolute path", "$.model"};
+  JobSettings settings;
+  try {
+    settings = job_settings_from_json(order.settings.dump(), "$.settings");
+  } catch (const InputError& error) {
+    throw RpcFault{kRpcBadInput, error.sentence(), error.at()};
+  }
+  Job job;
+  job.cell = cell_of(order, settings, cell_file_, description_);
+  settings.dry_run = order.dry_run;
+  job.settings = job_settings_to_json(settings);
+  job.settings_sha256 = job_settings_sha256(settings);
+  job.model = order.model;
+  job.dry_run = order.dry_run;
+  job.key = order.key;
+  job.uid = peer.uid;
+  job.gid = peer.gid;
+  job.copies = order.copies;
+  if (job.dry_run && job.copies != 1) throw RpcFault{kRpcBadParams, "a dry run has no copies", "$.copies"};
+  return job;
+}
+
+Job& JobPlanning::submit(const SubmitOrder& order, const Peer& peer) {
+  Job job = requested_job(order, peer);
+  if (Job* earlier = queue_.find_key(order.key)) {
+    if (is_same_order(*earlier, job)) return *earlier;
+    throw RpcFault{kRpcBadParams,
+                   "belongs to job " + std::to_string(earlier->id) + ", which was submitted with other parameters",
+                   "$.key"};
+  }
+  const auto unplanned = std::count_if(queue_.jobs().begin(), queue_.jobs().end(),
+                                       [](const auto& entry) { return is_unplanned(entry.second); });
+  if (static_cast<std::size_t>(unplanned) >= kUnplannedMax)
+    throw RpcFault{kRpcWrongState, std::to_string(kUnplannedMax) + " jobs wait already: cancel one or wait", ""};
+  try {
+    check_readable(order.model, peer.uid, peer.gid);
+  } catch (const InputError& error) {
+    throw RpcFault{kRpcBadInput, error.sentence(), error.at()};
+  }
+  Job& added = queue_.add(std::move(job));
+  // After the answer, which is to say "queued".
+  post_([this] { plan_next(); });
+  return added;
+}
+
+void JobPlanning::cancel(Job& job) {
+  const bool was_planning = current_job(job.id) != nullptr;
+  if (was_planning && current_->child) children_.cancel(*current_->child);
+  job.state = JobState::kCancelled;
+  job.stage.clear();
+  job.eta_s.reset();
+  queue_.changed(job);
+  if (was_planning) end_current();
+}
+
+void JobPlanning::shut_down() {
+  is_ending_ = true;
+  if (current_ && current_->child) children_.cancel(*current_->child);
+}
+
+void JobPlanning::plan_next() {
+  if (current_ || is_ending_) return;
+  const auto waiting = queue_.waiting();
   const auto found =
       std::find_if(waiting.begin(), waiting.end(), [](const Job* job) { return job->state == JobState::kQueued; });
   if (found == waiting.end()) return;
-  Job& job = jobs_.at((*found)->id);
-  planning_ = Planning{job.id, std::nullopt};
+  Job& job = *queue_.find((*found)->id);
+  current_ = Current{job.id, std::nullopt};
   job.state = JobState::kPlanning;
   job.progress = 0;
   job.error.reset();
   job.warnings.clear();
   job.stage = "copy";
-  changed(job);
+  queue_.changed(job);
   std::error_code error;
   fs::create_directories(job.folder, error);
-  if (error) return fail_planning(job, {job.folder.string(), "the job's folder can't be made: " + error.message()});
+  if (error) return fail(job, {job.folder.string(), "the job's folder cannot be made: " + error.message()});
   if (job.model_copy.empty())
     list_files(job);
   else
@@ -33,34 +128,35 @@ void JobQueue::plan_next() {
 }
 
 /// The job that is being planned, if it still is.
-Job* JobQueue::planned_job(std::int64_t id) {
-  return planning_ && planning_->job == id ? &jobs_.at(id) : nullptr;
+Job* JobPlanning::current_job(std::int64_t id) {
+  return current_ && current_->job == id ? queue_.find(id) : nullptr;
 }
 
-/// What all children of the pipeline have in common: the callbacks come home to the socket thread and find the job
-/// still being planned, or do nothing.
-ChildOrder JobQueue::watched_order(const Job& job, std::vector<std::string> arguments,
-                                   std::function<void(Job&, ChildOutcome)> on_end) {
+/// What all children of the pipeline have in common: their reports are posted to the socket thread, and are ignored
+/// there if the job is no longer being planned. Each callback has its own copy of post_, because the children's thread
+/// may still call it when this object is gone.
+ChildOrder JobPlanning::watched_order(const Job& job, std::vector<std::string> arguments,
+                                      std::function<void(Job&, ChildOutcome)> on_end) {
   ChildOrder order;
   order.arguments = std::move(arguments);
-  order.on_progress = [this, id = job.id](const std::string& stage, double fraction) {
-    post_([this, id, stage, fraction] {
-      if (Job* planned = planned_job(id)) {
+  order.on_progress = [this, post = post_, id = job.id](const std::string& stage, double fraction) {
+    post([this, id, stage, fraction] {
+      if (Job* planned = current_job(id)) {
         planned->stage = stage;
         planned->progress = fraction;
-        changed(*planned, false);
+        queue_.progressed(*planned);
       }
     });
   };
-  order.on_warning = [this, id = job.id](const std::string& sentence) {
-    post_([this, id, sentence] {
-      if (Job* planned = planned_job(id); planned && planned->warnings.size() < Job::kWarningsMax)
+  order.on_warning = [this, post = post_, id = job.id](const std::string& sentence) {
+    post([this, id, sentence] {
+      if (Job* planned = current_job(id); planned && planned->warnings.size() < Job::kWarningsMax)
         planned->warnings.push_back(sentence.substr(0, 1000));
     });
   };
-  order.on_end = [this, id = job.id, on_end = std::move(on_end)](ChildOutcome outcome) {
-    post_([this, id, on_end, outcome = std::move(outcome)] {
-      if (Job* planned = planned_job(id)) on_end(*planned, outcome);
+  order.on_end = [this, post = post_, id = job.id, on_end = std::move(on_end)](ChildOutcome outcome) {
+    post([this, id, on_end, outcome = std::move(outcome)] {
+      if (Job* planned = current_job(id)) on_end(*planned, outcome);
     });
   };
   return order;
@@ -68,24 +164,24 @@ ChildOrder JobQueue::watched_order(const Job& job, std::vector<std::string> argu
 
 /// Which files a model refers to is found by reading it, and reading untrusted bytes is a child's work, done with the
 /// submitter's rights.
-void JobQueue::list_files(Job& job) {
+void JobPlanning::list_files(Job& job) {
   ChildOrder order = watched_order(job, {"files", "--model", job.model.string()},
                                    [this](Job& planned, const ChildOutcome& outcome) { copy_files(planned, outcome); });
   order.owner = ChildOwner{job.uid, job.gid};
-  planning_->child = children_.start(std::move(order));
+  current_->child = children_.start(std::move(order));
 }
 
-void JobQueue::copy_files(Job& job, const ChildOutcome& outcome) {
-  planning_->child.reset();
-  if (!outcome.is_ok) return fail_planning(job, {outcome.error_at, outcome.error});
+void JobPlanning::copy_files(Job& job, const ChildOutcome& outcome) {
+  current_->child.reset();
+  if (!outcome.is_ok) return fail(job, {outcome.error_at, outcome.error});
   std::vector<fs::path> files;
   try {
     const Json result = Json::parse(outcome.result);
     for (const auto& file : result.at("files")) files.emplace_back(file.get<std::string>());
   } catch (const Json::exception&) {
-    return fail_planning(job, {"", "the pipeline gave no list of the model's files"});
+    return fail(job, {"", "the pipeline gave no list of the model's files"});
   }
-  children_.run([this, id = job.id, model = job.model, folder = job.folder, uid = job.uid, gid = job.gid,
+  children_.run([this, post = post_, id = job.id, model = job.model, folder = job.folder, uid = job.uid, gid = job.gid,
                  files = std::move(files)] {
     std::optional<ModelCopy> copy;
     JobError error;
@@ -94,12 +190,12 @@ void JobQueue::copy_files(Job& job, const ChildOutcome& outcome) {
     } catch (const InputError& refusal) {
       error = {refusal.at(), refusal.sentence()};
     } catch (const std::exception& failure) {
-      error = {model.string(), std::string("can't be copied: ") + failure.what()};
+      error = {model.string(), std::string("cannot be copied: ") + failure.what()};
     }
-    post_([this, id, copy, error] {
-      Job* planned = planned_job(id);
+    post([this, id, copy, error] {
+      Job* planned = current_job(id);
       if (planned == nullptr) return;
-      if (!copy) return fail_planning(*planned, error);
+      if (!copy) return fail(*planned, error);
       planned->model_copy = copy->model;
       planned->model_sha256 = copy->sha256;
       run_pipeline(*planned);
@@ -107,18 +203,18 @@ void JobQueue::copy_files(Job& job, const ChildOutcome& outcome) {
   });
 }
 
-void JobQueue::run_pipeline(Job& job) {
+void JobPlanning::run_pipeline(Job& job) {
   job.stage = "load";
-  changed(job);
-  planning_->child = children_.start(
+  queue_.changed(job);
+  current_->child = children_.start(
       watched_order(job,
                     {job.dry_run ? "dry-run" : "plan", "--model", job.model_copy.string(), "--settings-json",
                      job.settings, "--cell", job.cell, "--output", job.folder.string()},
-                    [this](Job& planned, const ChildOutcome& outcome) { finish_pipeline(planned, outcome); }));
+                    [this](Job& planned, const ChildOutcome& outcome) { finish(planned, outcome); }));
 }
 
-void JobQueue::finish_pipeline(Job& job, const ChildOutcome& outcome) {
-  if (!outcome.is_ok) return fail_planning(job, {outcome.error_at, outcome.error});
+void JobPlanning::finish(Job& job, const ChildOutcome& outcome) {
+  if (!outcome.is_ok) return fail(job, {outcome.error_at, outcome.error});
   try {
     const Json report = Json::parse(outcome.result);
     const Json& dots = report.at("dots");
@@ -130,26 +226,26 @@ void JobQueue::finish_pipeline(Job& job, const ChildOutcome& outcome) {
     job.planned_s =
         report.contains("time_s") && report["time_s"].is_object() ? report["time_s"].value("total", 0.) : 0.;
   } catch (const std::exception& error) {
-    return fail_planning(job, {"report.json", std::string("the pipeline's report can't be used: ") + error.what()});
+    return fail(job, {"report.json", std::string("the pipeline's report cannot be used: ") + error.what()});
   }
   job.state = job.dry_run ? JobState::kDone : JobState::kReady;
   job.progress = job.dry_run ? 1 : 0;
   job.stage.clear();
   if (!job.dry_run) job.eta_s = job.planned_s * description_.simulation.time_scale;
-  changed(job);
-  end_planning();
+  queue_.changed(job);
+  end_current();
 }
 
-void JobQueue::fail_planning(Job& job, JobError error) {
+void JobPlanning::fail(Job& job, JobError error) {
   job.state = JobState::kFailed;
   job.stage.clear();
   job.error = std::move(error);
-  changed(job);
-  end_planning();
+  queue_.changed(job);
+  end_current();
 }
 
-void JobQueue::end_planning() {
-  planning_.reset();
+void JobPlanning::end_current() {
+  current_.reset();
   plan_next();
 }
 

@@ -114,17 +114,29 @@ Json job_result(const Job& job) {
   return {{"job", job_to_json(job)}};
 }
 
+/// A job that is being painted is the executor's; any other is cancelled at once.
+Job& cancel_job(const Jobs& jobs, const std::string& id) {
+  Job& job = jobs.queue.get(id);
+  if (is_final(job.state)) forbid(job, "there is nothing to cancel");
+  if (job.state == JobState::kPainting)
+    jobs.painting.cancel(job);
+  else
+    jobs.planning.cancel(job);
+  return job;
+}
+
 }  // namespace
 
-MethodTable::MethodTable(JobQueue& book, CellController& desk, AuditLog& audit, std::function<Json()> info)
+MethodTable::MethodTable(const Jobs& jobs, CellController& controller, AuditLog& audit, std::function<Json()> info)
     : audit_(audit) {
-  add_job_methods(book);
-  add_cell_methods(desk);
+  add_job_acts(jobs);
+  add_job_views(jobs.queue);
+  add_cell_methods(controller);
   add_system_methods(std::move(info));
   add_session_method();
 }
 
-void MethodTable::add_job_methods(JobQueue& book) {
+void MethodTable::add_job_acts(const Jobs& jobs) {
   const Json job = result_with("job", reference("Job"));
   const auto add_act = [&](const char* name, const char* summary, Json params,
                            std::function<Job&(const Json&, const Caller&)> act) {
@@ -146,42 +158,46 @@ void MethodTable::add_job_methods(JobQueue& book) {
        {"copies",
         {{"type", "integer"},
          {"minimum", 1},
-         {"maximum", JobQueue::kCopiesMax},
+         {"maximum", JobPlanning::kCopiesMax},
          {"description", "parts to paint, one after another; default 1"}}}},
       {"model"});
   add_act("job.submit", "Takes a model; answers at once, the job is queued.", submit_params,
-          [&book](const Json& given, const Caller& caller) -> Job& {
-            return book.submit({given.at("model").get<std::string>(), given.value("settings", Json::object()),
-                                given.value("dry_run", false), given.value("key", ""), given.value("copies", 1)},
-                               caller.peer);
+          [jobs](const Json& given, const Caller& caller) -> Job& {
+            return jobs.planning.submit(
+                {given.at("model").get<std::string>(), given.value("settings", Json::object()),
+                 given.value("dry_run", false), given.value("key", ""), given.value("copies", 1)},
+                caller.peer);
           });
   const Json part = {{"const", true}, {"description", "the operator confirms that the part is in its place"}};
   add_act("job.start", "Paints a ready job; the cell must be armed.",
           object_schema({{"id", id_schema()}, {"part_in_place", part}}, {"id", "part_in_place"}),
-          [&book](const Json& given, const Caller&) -> Job& { return book.start(id_of(given)); });
+          [jobs](const Json& given, const Caller&) -> Job& { return jobs.painting.start(id_of(given)); });
   add_act("job.pause", "Ends painting between two dots.", job_params(),
-          [&book](const Json& given, const Caller&) -> Job& { return book.pause(id_of(given)); });
+          [jobs](const Json& given, const Caller&) -> Job& { return jobs.painting.pause(id_of(given)); });
   const Json in_doubt = {{"type", "string"},
                          {"enum", {"leave", "expose"}},
                          {"description", "what becomes of the dots in doubt; default: leave"}};
   add_act("job.resume", "Goes on with a paused job; the cell must be armed.",
           object_schema({{"id", id_schema()}, {"part_in_place", part}, {"in_doubt", in_doubt}}, {"id"}),
-          [&book](const Json& given, const Caller&) -> Job& {
-            return book.resume(id_of(given), given.value("in_doubt", "leave") == "expose",
-                               given.value("part_in_place", false));
+          [jobs](const Json& given, const Caller&) -> Job& {
+            return jobs.painting.resume(id_of(given), given.value("in_doubt", "leave") == "expose",
+                                        given.value("part_in_place", false));
           });
   const Json position = {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000000}, {"description", "1: the next"}};
   add_act("job.move", "Gives a waiting job another place in the queue.",
           object_schema({{"id", id_schema()}, {"position", position}}, {"id", "position"}),
-          [&book](const Json& given, const Caller&) -> Job& {
-            return book.move(id_of(given), given.at("position").get<int>());
+          [jobs](const Json& given, const Caller&) -> Job& {
+            return jobs.queue.move(id_of(given), given.at("position").get<int>());
           });
   add_act("job.cancel", "Gives a job up for good.", job_params(),
-          [&book](const Json& given, const Caller&) -> Job& { return book.cancel(id_of(given)); });
+          [jobs](const Json& given, const Caller&) -> Job& { return cancel_job(jobs, id_of(given)); });
+}
 
+void MethodTable::add_job_views(JobQueue& queue) {
+  const Json job = result_with("job", reference("Job"));
   methods_.push_back(
-      {"job.get", "One job.", false, job_params(), job, [&book](const Json& given, const Caller&, const Reply& reply) {
-         reply.result(job_result(book.get(id_of(given))));
+      {"job.get", "One job.", false, job_params(), job, [&queue](const Json& given, const Caller&, const Reply& reply) {
+         reply.result(job_result(queue.get(id_of(given))));
        }});
   methods_.push_back(
       {"job.list", "Jobs, the newest first; or those that wait, in their order.", false,
@@ -190,15 +206,15 @@ void MethodTable::add_job_methods(JobQueue& book) {
             {"order", {{"type", "string"}, {"enum", {"newest", "queue"}}, {"description", "default: newest"}}}},
            {}),
        result_with("jobs", {{"type", "array"}, {"items", reference("Job")}}),
-       [&book](const Json& given, const Caller&, const Reply& reply) {
+       [&queue](const Json& given, const Caller&, const Reply& reply) {
          Json jobs = Json::array();
          const auto limit = given.value("limit", std::size_t{100});
          if (given.value("order", "newest") == "queue") {
-           for (const Job* waiting : book.queue())
+           for (const Job* waiting : queue.waiting())
              if (jobs.size() < limit) jobs.push_back(job_to_json(*waiting));
            return reply.result({{"jobs", std::move(jobs)}});
          }
-         for (auto entry = book.jobs().rbegin(); entry != book.jobs().rend() && jobs.size() < limit; ++entry)
+         for (auto entry = queue.jobs().rbegin(); entry != queue.jobs().rend() && jobs.size() < limit; ++entry)
            jobs.push_back(job_to_json(entry->second));
          reply.result({{"jobs", std::move(jobs)}});
        }});
@@ -208,36 +224,38 @@ void MethodTable::add_job_methods(JobQueue& book) {
   methods_.push_back(
       {"job.watch",
        "The job now, and from now on a job.update notification {seq, job} for each change, over this connection.",
-       false, job_params(), watched, [&book](const Json& given, const Caller& caller, const Reply& reply) {
-         const Job& found = book.get(id_of(given));
+       false, job_params(), watched, [&queue](const Json& given, const Caller& caller, const Reply& reply) {
+         const Job& found = queue.get(id_of(given));
          caller.watch(found.id);
          reply.result({{"seq", found.seq}, {"job", job_to_json(found)}});
        }});
   methods_.push_back({"job.unwatch", "No more job.update notifications of this job over this connection.", false,
-                      job_params(), job, [&book](const Json& given, const Caller& caller, const Reply& reply) {
-                        const Job& found = book.get(id_of(given));
+                      job_params(), job, [&queue](const Json& given, const Caller& caller, const Reply& reply) {
+                        const Job& found = queue.get(id_of(given));
                         caller.unwatch(found.id);
                         reply.result(job_result(found));
                       }});
 }
 
-void MethodTable::add_cell_methods(CellController& desk) {
+void MethodTable::add_cell_methods(CellController& controller) {
   const Json cell = result_with("cell", reference("Cell"));
-  methods_.push_back({"cell.status", "The cell's state, laser, interlock, joints and devices.", false, no_params(),
-                      cell, [&desk](const Json&, const Caller&, const Reply& reply) { reply.result(desk.status()); }});
+  methods_.push_back(
+      {"cell.status", "The cell's state, laser, interlock, joints and devices.", false, no_params(), cell,
+       [&controller](const Json&, const Caller&, const Reply& reply) { reply.result(controller.status()); }});
   methods_.push_back({"cell.stop", "Laser off, axes stopped, at once and latched; a painting job is paused.", true,
-                      no_params(), cell, [&desk](const Json&, const Caller& caller, Reply reply) {
-                        desk.stop("stopped by " + caller.peer.user, std::move(reply));
+                      no_params(), cell, [&controller](const Json&, const Caller& caller, Reply reply) {
+                        controller.stop("stopped by " + caller.peer.user, std::move(reply));
                       }});
   methods_.push_back({"cell.clear", "Takes a stop back; nothing moves.", true, no_params(), cell,
-                      [&desk](const Json&, const Caller&, Reply reply) { desk.clear(std::move(reply)); }});
+                      [&controller](const Json&, const Caller&, Reply reply) { controller.clear(std::move(reply)); }});
   methods_.push_back({"cell.arm", "Axes ready, laser armed for one job; answered when its start delay is over.", true,
                       no_params(), cell,
-                      [&desk](const Json&, const Caller&, Reply reply) { desk.arm(std::move(reply)); }});
+                      [&controller](const Json&, const Caller&, Reply reply) { controller.arm(std::move(reply)); }});
   methods_.push_back(
       {"cell.home",
        "All axes to their home positions in the dark: up first, then the table, then the arm; answered when there.",
-       true, no_params(), cell, [&desk](const Json&, const Caller&, Reply reply) { desk.home(std::move(reply)); }});
+       true, no_params(), cell,
+       [&controller](const Json&, const Caller&, Reply reply) { controller.home(std::move(reply)); }});
 }
 
 void MethodTable::add_system_methods(std::function<Json()> info) {

@@ -6,6 +6,8 @@
 
 #include "daemon/server/audit_log.h"
 #include "daemon/server/cell_controller.h"
+#include "daemon/server/job_painting.h"
+#include "daemon/server/job_planning.h"
 #include "daemon/server/job_queue.h"
 #include "daemon/server/json_rpc.h"
 
@@ -34,10 +36,17 @@ struct Method {
   Right right() const;
 };
 
+/// What the methods of jobs are served by.
+struct Jobs {
+  JobQueue& queue;
+  JobPlanning& planning;
+  JobPainting& painting;
+};
+
 class MethodTable {
  public:
-  /// `info` answers system.info.
-  MethodTable(JobQueue& book, CellController& desk, AuditLog& audit, std::function<Json()> info);
+  /// `info` answers system.info. All others outlive the table.
+  MethodTable(const Jobs& jobs, CellController& controller, AuditLog& audit, std::function<Json()> info);
 
   /// Answers once, now or later.
   void dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const;
@@ -46,8 +55,9 @@ class MethodTable {
   const std::vector<Method>& methods() const { return methods_; }
 
  private:
-  void add_job_methods(JobQueue& book);
-  void add_cell_methods(CellController& desk);
+  void add_job_acts(const Jobs& jobs);
+  void add_job_views(JobQueue& queue);
+  void add_cell_methods(CellController& controller);
   void add_system_methods(std::function<Json()> info);
   void add_session_method();
 

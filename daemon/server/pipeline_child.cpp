@@ -151,7 +151,7 @@ PipelineChildren::~PipelineChildren() {
 void PipelineChildren::push(std::function<void()> task) {
   {
     const std::lock_guard lock(mutex_);
-    CHECK_LT(tasks_.size(), kQueueMax);  // the job book starts one thing at a time
+    CHECK_LT(tasks_.size(), kQueueMax);  // planning and painting each start one at a time
     tasks_.push_back(std::move(task));
   }
   ::eventfd_write(wake_fd_, 1);

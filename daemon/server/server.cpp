@@ -271,8 +271,8 @@ void Session::notify(const Job& job) {
 void Session::tell_news() {
   if (is_writing_ || is_closed_ || is_at_end_) return;
   for (const std::int64_t id : std::exchange(pending_updates_, {})) {
-    const auto job = services_.book.jobs().find(id);
-    if (job != services_.book.jobs().end())
+    const auto job = services_.queue.jobs().find(id);
+    if (job != services_.queue.jobs().end())
       send(rpc_notification("job.update", {{"seq", job->second.seq}, {"job", job_to_json(job->second)}}));
   }
 }

@@ -24,7 +24,7 @@ struct ServerLimits {
 /// What the requests of a connection are served by; all outlive the server's run.
 struct Services {
   const MethodTable& methods;
-  const JobQueue& book;
+  const JobQueue& queue;
   const Access& access;
 };
 
