@@ -38,24 +38,23 @@ bool survives(Place place, Kind kind, int call, const ExposureProgram& program) 
   WitnessedCell world;
   const std::size_t count = program.exposures.size();
   Journal journal = Journal::in_memory(count);
-  ExecutionControl control;
   Fault fault = fault_at(place, kind, call);
   const Cell inner = world.cell();
   fault.open_interlock = [&] { world.sim().set_interlock_closed(false); };
-  fault.stop = [&] { request_stop(inner, control); };
+  fault.stop = [&] { request_stop(inner, world.control); };
   FaultyAxes<4> robot(inner.robot, fault);
   FaultyAxes<2> table(inner.table, fault);
   FaultyLaser laser(inner.laser, fault);
   JumpingClock clock(inner.clock, fault);
-  const auto result = execute(program, {}, {robot, table, laser, clock}, world.description, journal, control);
+  const auto result = world.paint_through({robot, table, laser, clock}, program, journal);
   if (!fault.has_struck) return false;
   EXPECT_FALSE(inner.laser.status().is_emitting);
   EXPECT_LE(journal.in_doubt().size(), 1u);
   EXPECT_EQ(result.outcome != ExecutionOutcome::kFinished, !result.reason.empty()) << result.reason;
   EXPECT_FALSE(result.is_program_at_fault);
   world.sim().set_interlock_closed(true);
-  world.recover(control);
-  const auto rest = execute(program, {}, inner, world.description, journal, control);
+  world.recover();
+  const auto rest = world.paint_through(inner, program, journal);
   EXPECT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
   EXPECT_EQ(journal.done_count() + journal.in_doubt().size(), count);
   expect_painted_once(program, journal, world.emissions());
@@ -98,11 +97,10 @@ TEST(ExecutorFaultsTest, ALateAcknowledgementOfAPulseLeavesItsDotInDoubt) {
   WitnessedCell world;
   const auto program = small_program(20);
   Journal journal = Journal::in_memory(20);
-  ExecutionControl control;
   Fault fault = fault_at(Place::kFire, Kind::kThrowsLate, 8);
   FaultyLaser laser(world.cell().laser, fault);
-  const auto result = execute(program, {}, {world.cell().robot, world.cell().table, laser, world.cell().clock},
-                              world.description, journal, control);
+  const auto result =
+      world.paint_through({world.cell().robot, world.cell().table, laser, world.cell().clock}, program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
   EXPECT_EQ(journal.in_doubt(), std::vector<std::size_t>{7});
   EXPECT_EQ(journal.done_count(), 7u);
@@ -112,11 +110,10 @@ TEST(ExecutorFaultsTest, AStaleInPositionIsNotBelieved) {
   WitnessedCell world;
   const auto program = small_program(40);
   Journal journal = Journal::in_memory(40);
-  ExecutionControl control;
   Fault fault = fault_at(Place::kRobotMove, Kind::kStalePosition, 10);
   FaultyAxes<4> robot(world.cell().robot, fault);
-  const auto result = execute(program, {}, {robot, world.cell().table, world.cell().laser, world.cell().clock},
-                              world.description, journal, control);
+  const auto result =
+      world.paint_through({robot, world.cell().table, world.cell().laser, world.cell().clock}, program, journal);
   EXPECT_TRUE(fault.has_struck);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   expect_painted_once(program, journal, world.emissions());
@@ -129,11 +126,10 @@ TEST_P(AnAxisThatStandsElsewhere, IsAFaultAndSaysSo) {
   WitnessedCell world;
   const auto program = small_program(40);
   Journal journal = Journal::in_memory(40);
-  ExecutionControl control;
   Fault fault = fault_at(Place::kTableStatus, Kind::kElsewhere, GetParam());
   FaultyAxes<2> table(world.cell().table, fault);
-  const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
-                              world.description, journal, control);
+  const auto result =
+      world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
   const bool is_told = result.reason.find("the table says that it is in position but stands elsewhere") == 0 ||
                        result.reason.find("the table left its position") == 0;
@@ -219,10 +215,9 @@ TEST(ExecutorTest, HandsWayPointsAheadWhereOneChainMovesAlone) {
   for (const std::size_t look_ahead : {0u, 2u}) {
     WitnessedCell world;
     Journal journal = Journal::in_memory(100);
-    ExecutionControl control;
     BufferingRobot robot(world.cell().robot, look_ahead);
-    const auto result = execute(program, {}, {robot, world.cell().table, world.cell().laser, world.cell().clock},
-                                world.description, journal, control);
+    const auto result =
+        world.paint_through({robot, world.cell().table, world.cell().laser, world.cell().clock}, program, journal);
     ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
     EXPECT_EQ(robot.most_waiting, look_ahead);
     EXPECT_GT(robot.prepared, 80u);
@@ -267,10 +262,9 @@ TEST(ExecutorTest, TellsTheTableItsNextTargetAlthoughTheArmMovesAloneFirst) {
   const auto program = roundabout_program(60);
   WitnessedCell world;
   Journal journal = Journal::in_memory(60);
-  ExecutionControl control;
   NotingTable table(world.cell().table);
-  const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
-                              world.description, journal, control);
+  const auto result =
+      world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
   ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(table.followed, table.prepared);
   EXPECT_GE(table.followed, 5u);
@@ -308,10 +302,9 @@ TEST(ExecutorTest, TellsTheLaserItsNextPowerWhileTheAxesMove) {
   for (std::size_t i = 0; i < 40; ++i) program.exposures[i].power_w *= i % 2 == 0 ? 1.f : .5f;
   WitnessedCell world;
   Journal journal = Journal::in_memory(40);
-  ExecutionControl control;
   NotingLaser laser(world.cell().laser);
-  const auto result = execute(program, {}, {world.cell().robot, world.cell().table, laser, world.cell().clock},
-                              world.description, journal, control);
+  const auto result =
+      world.paint_through({world.cell().robot, world.cell().table, laser, world.cell().clock}, program, journal);
   ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   expect_painted_once(program, journal, world.emissions());
 }
@@ -353,10 +346,9 @@ TEST(ExecutorTest, APulseIsNotBelievedByWhatWasKnownBeforeIt) {
     for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
     WitnessedCell world;
     Journal journal = Journal::in_memory(10);
-    ExecutionControl control;
     UnheardTable table(world.cell(), unheard_s);
-    const auto result = execute(program, {}, {world.cell().robot, table, world.cell().laser, world.cell().clock},
-                                world.description, journal, control);
+    const auto result =
+        world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
     EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
     EXPECT_EQ(result.reason,
               unheard_s < 1 ? "the table left its position during a pulse" : "the table has told nothing for too long");
@@ -371,7 +363,6 @@ TEST(ExecutorTest, AStopForgetsWhatWasHandedAhead) {
     SCOPED_TRACE(call);
     WitnessedCell world;
     Journal journal = Journal::in_memory(60);
-    ExecutionControl control;
     Fault fault;
     fault.place = Place::kSleep;
     fault.kind = Kind::kStop;
@@ -380,8 +371,8 @@ TEST(ExecutorTest, AStopForgetsWhatWasHandedAhead) {
     BufferingRobot robot(inner.robot, 4);
     JumpingClock clock(inner.clock, fault);
     const Cell cell{robot, inner.table, inner.laser, clock};
-    fault.stop = [&] { request_stop(cell, control); };
-    const auto result = execute(program, {}, cell, world.description, journal, control);
+    fault.stop = [&] { request_stop(cell, world.control); };
+    const auto result = world.paint_through(cell, program, journal);
     if (!fault.has_struck) break;
     EXPECT_EQ(result.outcome, ExecutionOutcome::kStopped);
     const auto stopped_at = world.sim().joints();
@@ -389,8 +380,8 @@ TEST(ExecutorTest, AStopForgetsWhatWasHandedAhead) {
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       EXPECT_NEAR(world.sim().joints()[axis], stopped_at[axis], .5) << "it goes on moving";
     EXPECT_TRUE(robot.status().state == DeviceState::kReady);
-    world.recover(control);
-    const auto rest = execute(program, {}, cell, world.description, journal, control);
+    world.recover();
+    const auto rest = world.paint_through(cell, program, journal);
     ASSERT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
     expect_painted_once(program, journal, world.emissions());
   }
@@ -400,8 +391,7 @@ TEST(ExecutorTest, CountsItsOwnTimeOfEachDot) {
   WitnessedCell world(1);  // real time
   const auto program = small_program(20);
   Journal journal = Journal::in_memory(20);
-  ExecutionControl control;
-  const auto result = execute(program, {}, world.cell(), world.description, journal, control);
+  const auto result = world.paint(program, journal);
   ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(result.own_time.count(), 20u);
   EXPECT_GT(result.own_time.quantile_s(.5), 0);

@@ -24,10 +24,8 @@ TEST(ExecutorTest, PaintsEveryDotOnce) {
   WitnessedCell world;
   const auto program = small_program(1000);
   Journal journal = Journal::in_memory(1000);
-  ExecutionControl control;
   std::size_t told = 0;
-  const auto result = execute(program, {}, world.cell(), world.description, journal, control,
-                              [&](std::size_t done) { EXPECT_EQ(done, ++told); });
+  const auto result = world.paint(program, journal, [&](std::size_t done) { EXPECT_EQ(done, ++told); });
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(result.exposed, 1000u);
   EXPECT_EQ(told, 1000u);
@@ -40,8 +38,7 @@ TEST(ExecutorTest, PaintsEveryDotOnce) {
 TEST(ExecutorTest, AnEmptyProgramIsFinished) {
   WitnessedCell world;
   Journal journal = Journal::in_memory(0);
-  ExecutionControl control;
-  EXPECT_EQ(execute({}, {}, world.cell(), world.description, journal, control).outcome, ExecutionOutcome::kFinished);
+  EXPECT_EQ(world.paint({}, journal).outcome, ExecutionOutcome::kFinished);
 }
 
 TEST(ExecutorTest, PassesDotsOverInTheDark) {
@@ -52,8 +49,7 @@ TEST(ExecutorTest, PassesDotsOverInTheDark) {
     journal.arm(i);
     journal.doubt(i);
   }
-  ExecutionControl control;
-  const auto result = execute(program, {}, world.cell(), world.description, journal, control);
+  const auto result = world.paint(program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(result.exposed, 294u);
   EXPECT_EQ(world.emissions().size(), 294u);
@@ -64,14 +60,12 @@ TEST(ExecutorTest, PauseEndsBetweenTwoDotsAndTheRestFollows) {
   WitnessedCell world;
   const auto program = small_program(500);
   Journal journal = Journal::in_memory(500);
-  ExecutionControl control;
-  const auto paused = execute(program, {}, world.cell(), world.description, journal, control,
-                              [&](std::size_t done) { control.pause = done == 123; });
+  const auto paused = world.paint(program, journal, [&](std::size_t done) { world.control.pause = done == 123; });
   EXPECT_EQ(paused.outcome, ExecutionOutcome::kPaused);
   EXPECT_EQ(paused.exposed, 123u);
   EXPECT_TRUE(journal.in_doubt().empty());
-  control.pause = false;
-  const auto rest = execute(program, {world.sim().joints()}, world.cell(), world.description, journal, control);
+  world.control.pause = false;
+  const auto rest = execute(program, {world.sim().joints()}, world.cell(), world.description, journal, world.control);
   EXPECT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
   EXPECT_EQ(rest.exposed, 377u);
   expect_painted_once(program, journal, world.emissions());
@@ -85,7 +79,6 @@ TEST(ExecutorTest, StopsAtRandomMomentsLeaveAtMostOneDotInDoubtEach) {
   WitnessedCell world(0.02);
   const auto program = small_program(400);
   Journal journal = Journal::in_memory(400);
-  ExecutionControl control;
   std::size_t stops = 0;
   double worst_latency_s = 0;
   for (int round = 0; round < 1000; ++round) {
@@ -95,18 +88,18 @@ TEST(ExecutorTest, StopsAtRandomMomentsLeaveAtMostOneDotInDoubtEach) {
       std::this_thread::sleep_for(std::chrono::duration<double>(after_s));
       if (ended) return;
       const double asked_s = world.cell().clock.now_s();
-      EXPECT_TRUE(request_stop(world.cell(), control));
+      EXPECT_TRUE(request_stop(world.cell(), world.control));
       EXPECT_FALSE(world.cell().laser.status().is_emitting);
       worst_latency_s = std::max(worst_latency_s, world.cell().clock.now_s() - asked_s);
     });
-    const auto result = execute(program, {}, world.cell(), world.description, journal, control);
+    const auto result = world.paint(program, journal);
     ended = true;
     stopper.join();
     ASSERT_NE(result.outcome, ExecutionOutcome::kFailed) << result.reason;
     if (result.outcome == ExecutionOutcome::kFinished) break;
     ++stops;
     ASSERT_LE(journal.in_doubt().size(), stops);
-    world.recover(control);
+    world.recover();
   }
   EXPECT_GT(stops, 3u);
   EXPECT_EQ(journal.done_count() + journal.in_doubt().size(), 400u);
@@ -122,10 +115,9 @@ TEST(ExecutorTest, NothingIsEmittedAfterAStopWasAskedFor) {
     WitnessedCell world(0.02);
     const auto program = small_program(200);
     Journal journal = Journal::in_memory(200);
-    ExecutionControl control;
-    std::thread painter([&] { execute(program, {}, world.cell(), world.description, journal, control); });
+    std::thread painter([&] { world.paint(program, journal); });
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 20000));
-    request_stop(world.cell(), control);
+    request_stop(world.cell(), world.control);
     const double stopped_s = world.cell().clock.now_s();
     painter.join();
     for (const auto& emission : world.emissions()) {
@@ -140,10 +132,8 @@ TEST(ExecutorTest, AStopBeforeTheRunLetsNothingBegin) {
   WitnessedCell world;
   const auto program = small_program(10);
   Journal journal = Journal::in_memory(10);
-  ExecutionControl control;
-  control.stop = true;
-  EXPECT_EQ(execute(program, {}, world.cell(), world.description, journal, control).outcome,
-            ExecutionOutcome::kStopped);
+  world.control.stop = true;
+  EXPECT_EQ(world.paint(program, journal).outcome, ExecutionOutcome::kStopped);
   EXPECT_TRUE(world.emissions().empty());
   EXPECT_TRUE(journal.in_doubt().empty());
 }
@@ -152,17 +142,15 @@ TEST(ExecutorTest, AnOpenInterlockEndsTheRunInTheDark) {
   WitnessedCell world;
   const auto program = small_program(100);
   Journal journal = Journal::in_memory(100);
-  ExecutionControl control;
-  const auto result = execute(program, {}, world.cell(), world.description, journal, control, [&](std::size_t done) {
+  const auto result = world.paint(program, journal, [&](std::size_t done) {
     if (done == 40) world.sim().set_interlock_closed(false);
   });
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
   EXPECT_NE(result.reason.find("interlock"), std::string::npos) << result.reason;
   EXPECT_EQ(world.emissions().size(), 40u);
   world.sim().set_interlock_closed(true);
-  world.recover(control);
-  EXPECT_EQ(execute(program, {}, world.cell(), world.description, journal, control).outcome,
-            ExecutionOutcome::kFinished);
+  world.recover();
+  EXPECT_EQ(world.paint(program, journal).outcome, ExecutionOutcome::kFinished);
   expect_painted_once(program, journal, world.emissions());
 }
 
@@ -171,12 +159,11 @@ TEST(ExecutorTest, AnInterlockOpenedInAPulseLeavesThatDotInDoubt) {
   auto program = small_program(60);
   for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
   Journal journal = Journal::in_memory(60);
-  ExecutionControl control;
   std::thread guard([&] {
     while (!world.cell().laser.status().is_emitting) std::this_thread::yield();
     world.sim().set_interlock_closed(false);
   });
-  const auto result = execute(program, {}, world.cell(), world.description, journal, control);
+  const auto result = world.paint(program, journal);
   guard.join();
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
   EXPECT_LE(journal.in_doubt().size(), 1u);
@@ -189,8 +176,7 @@ TEST(ExecutorTest, RefusesWhatIsOutsideTheLimits) {
     auto program = small_program(20);
     change(program);
     Journal journal = Journal::in_memory(20);
-    ExecutionControl control;
-    const auto result = execute(program, {}, world.cell(), world.description, journal, control);
+    const auto result = world.paint(program, journal);
     EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed) << what;
     EXPECT_TRUE(result.is_program_at_fault) << what << ": " << result.reason;
     EXPECT_EQ(journal.done_count(), 10u) << what;
@@ -215,8 +201,7 @@ TEST(ExecutorTest, AFaultReportedByADeviceIsToldInItsWords) {
   WitnessedCell world;
   const auto program = small_program(100);
   Journal journal = Journal::in_memory(100);
-  ExecutionControl control;
-  const auto result = execute(program, {}, world.cell(), world.description, journal, control, [&](std::size_t done) {
+  const auto result = world.paint(program, journal, [&](std::size_t done) {
     if (done == 10) world.sim().fail_table("overload on axis C");
   });
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
@@ -238,9 +223,8 @@ TEST(ExecutorTest, RefusesACellThatIsNotReady) {
 TEST(ExecutorTest, TravelsInTheDarkWithoutAnArmedLaser) {
   WitnessedCell world;
   world.cell().laser.disable();
-  ExecutionControl control;
   const Joints goal{.2, .3, .2, 1, .1, 1};
-  const auto result = travel({{.4, .4, .2, 0, 0, 0}, goal}, world.cell(), world.description, control);
+  const auto result = travel({{.4, .4, .2, 0, 0, 0}, goal}, world.cell(), world.description, world.control);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(key_of(world.sim().joints()), key_of(goal));
   EXPECT_TRUE(world.emissions().empty());

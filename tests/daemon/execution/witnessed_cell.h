@@ -33,16 +33,24 @@ class WitnessedCell {
     return emissions_;
   }
   /// What an operator does after a stop or a fault.
-  void recover(ExecutionControl& control) {
+  void recover() {
     control.stop = false;
-    for (AxisGroup<4>* robot : {&sim_.cell().robot})
-      if (robot->status().state == DeviceState::kFault) robot->clear_fault();
+    if (sim_.cell().robot.status().state == DeviceState::kFault) sim_.cell().robot.clear_fault();
     if (sim_.cell().table.status().state == DeviceState::kFault) sim_.cell().table.clear_fault();
     if (sim_.cell().laser.status().state == DeviceState::kFault) sim_.cell().laser.clear_fault();
     bring_up(sim_.cell());
   }
 
+  ExecutionResult paint(const ExposureProgram& program, Journal& journal, const ExecutionProgress& progress = {}) {
+    return execute(program, {}, cell(), description, journal, control, progress);
+  }
+  /// The same through other devices, which stand before those of the simulated cell.
+  ExecutionResult paint_through(const Cell& devices, const ExposureProgram& program, Journal& journal) {
+    return execute(program, {}, devices, description, journal, control);
+  }
+
   const CellDescription description;
+  ExecutionControl control;
 
  private:
   mutable std::mutex mutex_;

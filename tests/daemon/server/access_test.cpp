@@ -80,7 +80,7 @@ TEST(AccessTest, ATokenIsAUser) {
 TEST(ServerTcpTest, NothingListensUnlessConfigured) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(client.result("system.info").at("system").at("tcp"), nullptr);
   EXPECT_EQ(world.daemon().tcp_address(), "");
 }
@@ -128,7 +128,7 @@ TEST(ServerTcpTest, WhoMayOnlyLookMayAlsoStop) {
   world.options.settings = with_rules({{"nobody", "", false}});
   world.options.settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{"nobody", sha256_hex("look")}}};
   world.begin();
-  LineClient mine(world.options.socket);
+  LineClient mine = world.client();
   const auto id = world.submit(mine, world.model("cup.wrl"), "ready");
   const auto client = LineClient::over_tcp(world.daemon().tcp_address());
   client->result("session.open", {{"token", "look"}});

@@ -160,7 +160,7 @@ TEST(ServerFuzzTest, TheCorpusIsAnsweredAndTheDaemonGoesOn) {
        std::filesystem::directory_iterator(std::string(HILBRUSH_SOURCE_DIR) + "/tests/fuzz/corpus/rpc")) {
     SCOPED_TRACE(entry.path().string());
     std::ifstream in(entry.path(), std::ios::binary);
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     client.send_bytes(std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>()));
     client.end_sending();
     std::size_t answers = 0;
@@ -172,7 +172,7 @@ TEST(ServerFuzzTest, TheCorpusIsAnsweredAndTheDaemonGoesOn) {
     ++files;
   }
   EXPECT_GT(files, 5u);
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto laser = [&] { return client.result("cell.status").at("cell").at("laser").get<std::string>(); };
   // A stop to whose answer nobody listened may still be on its way to the laser.
   while (laser() == "unconfirmed") std::this_thread::yield();

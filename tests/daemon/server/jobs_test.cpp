@@ -50,7 +50,7 @@ std::vector<std::size_t> emission_counts(const fs::path& job_folder) {
 TEST(ServerJobsTest, AJobGoesTheWholeWay) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("cup.wrl", 200), "ready");
   Json job = client.result("job.get", named(id)).at("job");
   EXPECT_EQ(job.at("dots").at("placed"), 205);
@@ -91,7 +91,8 @@ TEST(ServerJobsTest, StopsPausesAndResumesUntilEveryDotIsPaintedOnce) {
   DaemonWorld world;
   world.options.time_scale = 0.02;
   world.begin();
-  LineClient operator_a(world.options.socket), operator_b(world.options.socket);
+  LineClient operator_a = world.client();
+  LineClient operator_b = world.client();
   const auto id = world.submit(operator_a, world.model("cup.wrl", 1000), "ready");
   world.clear_and_arm(operator_a);
   operator_a.result("job.start", placed(id));
@@ -134,7 +135,7 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
   DaemonWorld world;
   world.options.time_scale = 0.02;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("long.wrl", 2000), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(id));
@@ -172,7 +173,7 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
 TEST(ServerJobsTest, AStopWhileTheWayIsPlannedLeavesTheJobResumable) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("slowway.wrl"), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(id));
@@ -189,7 +190,7 @@ TEST(ServerJobsTest, AStopWhileTheWayIsPlannedLeavesTheJobResumable) {
 TEST(ServerJobsTest, NoWayToTheNextDotPausesTheJobWithASentence) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("lost.wrl"), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(id));
@@ -200,7 +201,7 @@ TEST(ServerJobsTest, NoWayToTheNextDotPausesTheJobWithASentence) {
 TEST(ServerJobsTest, AProgramForAnotherModelOrBeyondTheLimitsIsNeverPainted) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto stray = world.submit(client, world.model("stray.wrl"), "ready");
   const auto wild = world.submit(client, world.model("wild.wrl"), "ready");
   world.clear_and_arm(client);
@@ -221,7 +222,7 @@ TEST(ServerJobsTest, PipelinesInTroubleFailTheirJobsWithASentenceAndDisturbNoPai
   world.options.pipeline_silence_s = 5;
   world.options.pipeline_memory_mb = 100;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto painting = world.submit(client, world.model("cup.wrl", 3000), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(painting));
@@ -248,7 +249,7 @@ TEST(ServerJobsTest, APipelineThatIsNotThereFailsTheJob) {
   DaemonWorld world;
   world.options.pipeline = "/nowhere/hilbrush-pipeline";
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("cup.wrl"), "failed");
   EXPECT_NE(client.result("job.get", named(id))
                 .at("job")
@@ -263,7 +264,7 @@ TEST(ServerJobsTest, CancelWorksInEveryStateThatIsNotFinal) {
   DaemonWorld world;
   world.options.time_scale = 0.02;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto planning = world.submit(client, world.model("hang.wrl"), "planning");
   const auto queued =
       client.result("job.submit", {{"model", world.model("cup.wrl", 3000).string()}, {"settings", {{"size_mm", 80}}}});
@@ -291,7 +292,7 @@ TEST(ServerJobsTest, JobsSurviveARestart) {
   world.begin();
   std::string done, painting, failed, planning;
   {
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     failed = world.submit(client, world.model("bad.wrl"), "failed");
     done = world.submit(client, world.model("dry.wrl"), "done", true);
     painting = world.submit(client, world.model("cup.wrl", 2000), "ready");
@@ -303,7 +304,7 @@ TEST(ServerJobsTest, JobsSurviveARestart) {
   }
   world.end();
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "stopped");
   EXPECT_EQ(client.result("job.get", named(failed)).at("job").at("error").at("at"), "bad.wrl:12");
   EXPECT_EQ(client.result("job.get", named(done)).at("job").at("state"), "done");
@@ -328,14 +329,14 @@ TEST(ServerJobsTest, AnIdempotencyKeyIsOneJob) {
   const Json order{{"model", model.string()}, {"settings", {{"size_mm", 80}}}, {"key", "order-17"}};
   std::string id;
   {
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     id = client.result("job.submit", order).at("job").at("id").get<std::string>();
     EXPECT_EQ(client.result("job.submit", order).at("job").at("id"), id);
     world.wait_for(client, id, "ready");
   }
   world.end();
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(client.result("job.submit", order).at("job").at("id"), id) << "also after a restart";
   Json other = order;
   other["settings"]["size_mm"] = 90;
@@ -348,7 +349,7 @@ TEST(ServerJobsTest, ADamagedJobStoreIsSetAside) {
   fs::create_directories(world.options.state);
   std::ofstream(world.options.state / "jobs.sqlite") << std::string(10000, 'x');
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_TRUE(client.result("job.list").at("jobs").empty());
   std::size_t aside = 0;
   for (const auto& entry : fs::directory_iterator(world.options.state))
@@ -359,7 +360,7 @@ TEST(ServerJobsTest, ADamagedJobStoreIsSetAside) {
 TEST(ServerJobsTest, BadOrdersAreRefusedWithTheirPlace) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto refusal = [&](const Json& params) { return client.call("job.submit", params).at("error"); };
   EXPECT_EQ(refusal(Json::object()).at("data").at("at"), "$.model");
   EXPECT_EQ(refusal({{"model", "cup.wrl"}}).at("code"), kRpcBadParams) << "a relative path";
@@ -379,7 +380,7 @@ TEST(ServerJobsTest, BadOrdersAreRefusedWithTheirPlace) {
 TEST(ServerJobsTest, ActsAreAudited) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   client.result("cell.stop");
   client.call("job.start", placed("4"));
   client.result("cell.status");

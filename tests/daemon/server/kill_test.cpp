@@ -191,7 +191,7 @@ TEST(ServerKillTest, TellsSystemdThatItIsReadyAliveAndEnding) {
   DaemonProcess daemon(world.options, {"NOTIFY_SOCKET=" + path.string(), "WATCHDOG_USEC=400000"});
   using std::chrono::milliseconds;
   EXPECT_EQ(systemd.next(milliseconds(20000)), "READY=1");
-  EXPECT_NO_THROW(LineClient client(world.options.socket)) << "ready means that it answers";
+  EXPECT_NO_THROW(world.client()) << "ready means that it answers";
   for (int i = 0; i < 3; ++i) EXPECT_EQ(systemd.next(milliseconds(5000)), "WATCHDOG=1");
   ::kill(daemon.pid(), SIGSTOP);
   while (!systemd.next(milliseconds(100)).empty()) {

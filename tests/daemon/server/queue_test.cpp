@@ -56,7 +56,7 @@ TEST(ServerQueueTest, TheOrderCanBeChangedAndSurvivesARestart) {
   world.begin();
   std::string blocking, a, b, c;
   {
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     blocking = world.submit(client, world.model("hang.wrl"), "planning");
     a = queued(client, world.model("a.wrl"));
     b = queued(client, world.model("b.wrl"));
@@ -71,7 +71,7 @@ TEST(ServerQueueTest, TheOrderCanBeChangedAndSurvivesARestart) {
   }
   world.end();
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(queue_of(client), (std::vector{blocking, c, b, a}));
   client.result("job.cancel", {{"id", blocking}});
   EXPECT_EQ(client.error_code("job.move", {{"id", blocking}, {"position", 1}}), kRpcWrongState)
@@ -128,7 +128,7 @@ TEST(ServerQueueTest, AMissingJournalIsNeverMadeAnew) {
   DaemonWorld world;
   world.options.time_scale = .02;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("cup.wrl", 500), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(id));
@@ -154,7 +154,7 @@ TEST(ServerQueueTest, TheJournalIsBelievedWhereTheStoreIsBehind) {
   world.begin();
   std::string id;
   {
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     id = world.submit(client, world.model("cup.wrl", 500), "ready");
     world.clear_and_arm(client);
     client.result("job.start", placed(id));
@@ -163,7 +163,7 @@ TEST(ServerQueueTest, TheJournalIsBelievedWhereTheStoreIsBehind) {
   world.end();
   execute_sql(world.options.state / "jobs.sqlite", "UPDATE job SET state = 'ready', is_begun = 0, exposed = 0");
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const Json job = world.wait_for(client, id, "paused");
   EXPECT_TRUE(job.at("needs_part_in_place").get<bool>());
   const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
@@ -184,7 +184,7 @@ TEST(ServerQueueTest, TheJournalIsBelievedWhereTheStoreIsBehind) {
 TEST(ServerQueueTest, AProgramOfAnotherVersionRefusesToRun) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("older.wrl"), "ready");
   world.clear_and_arm(client);
   client.result("job.start", placed(id));
@@ -200,7 +200,7 @@ TEST(ServerQueueTest, ALostStoreIsMadeAgainFromTheJobsFolders) {
     world.begin();
     std::string done, painting, nameless;
     {
-      LineClient client(world.options.socket);
+      LineClient client = world.client();
       done = world.submit(client, world.model("dry.wrl"), "done", true);
       nameless = world.submit(client, world.model("other.wrl"), "ready");
       painting = world.submit(client, world.model("cup.wrl", 600), "ready");
@@ -218,7 +218,7 @@ TEST(ServerQueueTest, ALostStoreIsMadeAgainFromTheJobsFolders) {
     fs::remove(world.job_folder(nameless) / "job.json");
     world.begin();
     EXPECT_NE(world.daemon().notice().find("2 jobs were found again"), std::string::npos) << world.daemon().notice();
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     EXPECT_EQ(job_of(client, done).at("state"), "done");
     EXPECT_EQ(job_of(client, nameless).at("state"), "failed") << "its files keep its number";
     const Json job = job_of(client, painting);
@@ -330,7 +330,7 @@ TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobo
     }
   }
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   for (int i = 0; i < 3; ++i) {
     const std::string id = world.submit(client, world.model("cup.wrl", 5), "done", true);
     EXPECT_EQ(client.result("job.get", {{"id", id}}).at("job").at("state"), "done");

@@ -73,7 +73,7 @@ class Crowd {
     }
   }
   void visit() {
-    LineClient client(world_.options.socket);
+    LineClient client = world_.client();
     switch (random_() % 6) {
       case 0:
         client.send_bytes("{\"jsonrpc\":\"2.0\",\"id\":1,\"meth");
@@ -145,7 +145,7 @@ inline std::ostream& operator<<(std::ostream& out, const SoakTrace& trace) {
 
 /// Gone clients are noticed when the daemon next looks.
 inline void wait_for_clients_to_go(DaemonWorld& world) {
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto clients = [&] { return client.result("system.info").at("system").at("clients"); };
   for (int i = 0; i < 500 && clients() != 1; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(clients(), 1);

@@ -36,7 +36,7 @@ class Soak {
   }
 
   void paint_one_job() {
-    LineClient client(world_.options.socket);
+    LineClient client = world_.client();
     const int copies = random_() % 4 == 0 ? 2 : 1;
     const fs::path model = models_[random_() % models_.size()];
     const auto id =

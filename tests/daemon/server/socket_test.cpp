@@ -23,7 +23,7 @@ const std::string kStatus = R"({"jsonrpc":"2.0","id":1,"method":"cell.status"})"
 TEST(ServerSocketTest, RefusesWhatIsNoRequestAndGoesOn) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const std::vector<std::pair<std::string, int>> cases{
       {"{", kRpcParse},
       {"\xff\xfe", kRpcParse},
@@ -57,7 +57,7 @@ TEST(ServerSocketTest, RefusesWhatIsNoRequestAndGoesOn) {
 TEST(ServerSocketTest, TakesHalfPipelinedAndEmptyMessages) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   for (const char byte : kStatus + "\r\n") client.send_bytes(std::string(1, byte));
   EXPECT_EQ(client.read_message().at("id"), 1);
   std::string many = "\n  \n";
@@ -70,7 +70,7 @@ TEST(ServerSocketTest, TakesHalfPipelinedAndEmptyMessages) {
 TEST(ServerSocketTest, ServesBatchesAndNotifications) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   client.send_bytes("[" + kStatus +
                     R"(,{"jsonrpc":"2.0","method":"cell.stop"},{"jsonrpc":"2.0","id":"b","method":"nothing"},5])" +
                     "\n");
@@ -94,7 +94,8 @@ TEST(ServerSocketTest, ServesBatchesAndNotifications) {
 TEST(ServerSocketTest, AHugeMessageIsRefusedAndItsConnectionClosed) {
   DaemonWorld world;
   world.begin();
-  LineClient huge(world.options.socket), other(world.options.socket);
+  LineClient huge = world.client();
+  LineClient other = world.client();
   std::thread sender([&] { huge.send_bytes(std::string((std::size_t{1} << 20) + 100000, 'x')); });
   EXPECT_EQ(huge.read_message().at("error").at("code"), kRpcParse);
   EXPECT_EQ(huge.read_line(), std::nullopt);
@@ -106,7 +107,7 @@ TEST(ServerSocketTest, ManyIdleClientsAndOneThatNeverReadsDisturbNobody) {
   DaemonWorld world;
   world.options.time_scale = 0.02;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const auto id = world.submit(client, world.model("cup.wrl", 1500), "ready");
 
   std::vector<std::unique_ptr<LineClient>> idle;
@@ -114,7 +115,7 @@ TEST(ServerSocketTest, ManyIdleClientsAndOneThatNeverReadsDisturbNobody) {
   for (std::size_t i = 0; i < idle.size(); i += 2)
     idle[i]->send_bytes(kStatus.substr(0, i % kStatus.size()));  // half a message, for ever
 
-  LineClient deaf(world.options.socket);
+  LineClient deaf = world.client();
   const std::string watch = R"({"jsonrpc":"2.0","id":1,"method":"job.watch","params":{"id":")" + id + "\"}}\n";
   const std::string discover = R"({"jsonrpc":"2.0","id":2,"method":"rpc.discover"})"
                                "\n";
@@ -146,7 +147,8 @@ TEST(ServerSocketTest, ManyIdleClientsAndOneThatNeverReadsDisturbNobody) {
 TEST(ServerSocketTest, ASlowWatcherGetsFewerUpdatesAndTheLastOne) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket), watcher(world.options.socket);
+  LineClient client = world.client();
+  LineClient watcher = world.client();
   const auto id = world.submit(client, world.model("cup.wrl", 300), "ready");
   watcher.result("job.watch", {{"id", id}});
   world.clear_and_arm(client);
@@ -159,7 +161,7 @@ TEST(ServerSocketTest, ASlowWatcherGetsFewerUpdatesAndTheLastOne) {
 TEST(ServerSocketTest, AClientThatEndsItsSideStillGetsItsAnswers) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   client.send_bytes(kStatus + "\n" + kStatus + "\n");
   client.end_sending();
   EXPECT_TRUE(client.read_message().contains("result"));
@@ -174,7 +176,7 @@ TEST(ServerSocketTest, RandomBytesNeverEndTheDaemon) {
   SCOPED_TRACE(seed);
   std::mt19937 random(seed);
   for (int round = 0; round < 300; ++round) {
-    LineClient client(world.options.socket);
+    LineClient client = world.client();
     std::string bytes =
         R"({"jsonrpc":"2.0","id":1,"method":"job.submit","params":{"model":"/x","settings":{"dpi":100,"size_mm":80}}})";
     for (int change = 0; change < 1 + static_cast<int>(random() % 6); ++change) {
@@ -198,7 +200,7 @@ TEST(ServerSocketTest, RandomBytesNeverEndTheDaemon) {
     while (client.read_line()) {
     }
   }
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "stopped");
 }
 
@@ -219,7 +221,7 @@ TEST(ServerSocketTest, ASecondDaemonIsRefusedAndAStaleSocketIsNot) {
   DaemonOptions other = world.options;
   other.state = world.folder() / "other";
   EXPECT_THROW(Daemon{other}, std::runtime_error) << "same socket";
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "stopped");
   world.end();
   EXPECT_FALSE(fs::exists(world.options.socket));
@@ -255,7 +257,7 @@ TEST(ServerSocketTest, BadOptionsAreSentences) {
 TEST(ServerSocketTest, DiscoverListsExactlyWhatIsServed) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   const Json document = client.result("rpc.discover");
   std::set<std::string> names;
   for (const auto& method : document.at("methods")) {
@@ -276,7 +278,7 @@ TEST(ServerSocketTest, DiscoverListsExactlyWhatIsServed) {
 TEST(ServerSocketTest, TheCellIsClearedArmedAndHomedInThreeActs) {
   DaemonWorld world;
   world.begin();
-  LineClient client(world.options.socket);
+  LineClient client = world.client();
   EXPECT_EQ(client.error_code("cell.arm"), kRpcWrongState);
   EXPECT_EQ(client.error_code("cell.home"), kRpcWrongState);
   EXPECT_EQ(client.result("cell.clear").at("cell").at("state"), "idle");
@@ -297,7 +299,8 @@ TEST(ServerSocketTest, AStopOvertakesArmingWithItsStartDelay) {
   DaemonWorld world;
   world.options.time_scale = 1;  // five seconds of start delay
   world.begin();
-  LineClient client(world.options.socket), other(world.options.socket);
+  LineClient client = world.client();
+  LineClient other = world.client();
   client.result("cell.clear");
   client.send_bytes(R"({"jsonrpc":"2.0","id":"arm","method":"cell.arm"})"
                     "\n");
