@@ -13,7 +13,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-/// Beyond this, squares and volumes of coordinates leave the range of numbers.
+/// In units of the file. Beyond this, squares and volumes of coordinates leave the range of numbers.
 constexpr double kMaxCoordinate = 1e30;
 
 double linear_of_srgb(double encoded) {
@@ -34,7 +34,8 @@ float luminance_of_srgb(double red, double green, double blue) {
 std::vector<Vector2d> bounding_box_mapping(const std::vector<Vector3d>& points,
                                            const std::vector<std::uint32_t>& corners) {
   if (corners.empty()) return {};
-  Vector3d low = points[corners[0]], high = low;
+  Vector3d low = points[corners[0]];
+  Vector3d high = low;
   for (const std::uint32_t corner : corners) {
     low = low.cwiseMin(points[corner]);
     high = high.cwiseMax(points[corner]);
@@ -105,36 +106,41 @@ void MeshBuilder::add(const FaceList& faces, const Eigen::Affine3d& X, const Loo
   }
   const bool is_flipped = faces.is_reversed != (X.linear().determinant() < 0);
 
-  std::vector<std::size_t> kept;  // corners of the face without immediate repetitions
-  std::vector<Vector3d> outline;
   std::size_t begin = 0;
   for (const std::size_t end : faces.face_ends) {
-    kept.clear();
-    outline.clear();
-    bool is_finite = true;
-    for (std::size_t c = begin; c < end; ++c) {
-      if (!kept.empty() && faces.corners[kept.back()] == faces.corners[c]) continue;
-      kept.push_back(c);
-      is_finite = is_finite && vertex_of_point[faces.corners[c]] != kUnused;
-    }
+    const bool is_usable_face = take_outline(faces, begin, end, vertex_of_point);
     begin = end;
-    while (kept.size() > 1 && faces.corners[kept.front()] == faces.corners[kept.back()]) kept.pop_back();
-    if (!is_finite) {
-      ++infinite_face_count_;
-      continue;
-    }
-    if (kept.size() < 3) {
-      if (short_face_count_++ == 0) first_short_face_ = faces.at;
-      continue;
-    }
-    if (mesh_.triangles.size() + kept.size() - 2 > limits_.triangles)
+    if (!is_usable_face) continue;
+    if (mesh_.triangles.size() + kept_.size() - 2 > limits_.triangles)
       throw InputError(faces.at, "the model has more triangles than the limit of " + std::to_string(limits_.triangles));
-    for (const std::size_t c : kept) outline.push_back(faces.points[faces.corners[c]]);
-    for (const auto& [a, b, c] : cutter_.cut(outline)) {
-      add_triangle(*source, look, {kept[a], kept[b], kept[c]}, is_flipped, vertex_of_point);
+    for (const auto& [a, b, c] : cutter_.cut(outline_)) {
+      add_triangle(*source, look, {kept_[a], kept_[b], kept_[c]}, is_flipped, vertex_of_point);
       mesh_.material_index.push_back(material);
     }
   }
+}
+
+bool MeshBuilder::take_outline(const FaceList& faces, std::size_t begin, std::size_t end,
+                               const std::vector<std::uint32_t>& vertex_of_point) {
+  kept_.clear();
+  bool is_finite = true;
+  for (std::size_t c = begin; c < end; ++c) {
+    if (!kept_.empty() && faces.corners[kept_.back()] == faces.corners[c]) continue;
+    kept_.push_back(c);
+    is_finite = is_finite && vertex_of_point[faces.corners[c]] != kUnused;
+  }
+  while (kept_.size() > 1 && faces.corners[kept_.front()] == faces.corners[kept_.back()]) kept_.pop_back();
+  if (!is_finite) {
+    ++infinite_face_count_;
+    return false;
+  }
+  if (kept_.size() < 3) {
+    if (short_face_count_++ == 0) first_short_face_ = faces.at;
+    return false;
+  }
+  outline_.clear();
+  for (const std::size_t c : kept_) outline_.push_back(faces.points[faces.corners[c]]);
+  return true;
 }
 
 void MeshBuilder::add_triangle(const FaceList& faces, const Look& look, const std::array<std::size_t, 3>& corners,

@@ -33,7 +33,8 @@ struct Look {
   float luminance = 1;                      ///< linear, of the material
   double opacity = 1;
   int texture = -1;
-  bool repeat_u = true, repeat_v = true;
+  bool repeat_u = true;
+  bool repeat_v = true;
   Eigen::Affine2d X_uv = Eigen::Affine2d::Identity();  ///< the texture transform
   std::string name;
 };
@@ -56,6 +57,9 @@ class MeshBuilder {
  private:
   std::uint32_t material_of(const FaceList& faces, const Look& look);
   std::vector<std::uint32_t> add_vertices(const FaceList& faces, const Eigen::Affine3d& X);
+  /// Puts the usable outline of a face into kept_ and outline_; false if it is dropped, and counted.
+  bool take_outline(const FaceList& faces, std::size_t begin, std::size_t end,
+                    const std::vector<std::uint32_t>& vertex_of_point);
   void add_triangle(const FaceList& faces, const Look& look, const std::array<std::size_t, 3>& corners, bool is_flipped,
                     const std::vector<std::uint32_t>& vertex_of_point);
 
@@ -65,7 +69,10 @@ class MeshBuilder {
   TexturedMesh mesh_;
   std::map<MaterialKey, std::uint32_t> material_indices_;
   PolygonCutter cutter_;
-  std::size_t short_face_count_ = 0, infinite_face_count_ = 0;
+  std::vector<std::size_t> kept_;         ///< corners of the face at hand, without immediate repetitions
+  std::vector<Eigen::Vector3d> outline_;  ///< their positions
+  std::size_t short_face_count_ = 0;
+  std::size_t infinite_face_count_ = 0;
   std::string first_short_face_;
 };
 

@@ -6,7 +6,7 @@
 
 /// The mesh formats that OpenMesh reads. Its readers fill a list of polygons here, not one of its meshes, so that faces
 /// which do not fit together as a manifold arrive as they are and mesh_repair reports what it does about them. What its
-/// readers do not bear (files that name other files, counts that lie, endless lists) is checked or rewritten before
+/// readers cannot cope with (files that name other files, wrong counts, endless lists) is checked or rewritten before
 /// they see the bytes.
 namespace hilbrush {
 

@@ -9,9 +9,9 @@
 #include "sampling/model/files/polygon_importer.h"
 #include "sampling/model/files/text_lines.h"
 
-/// OBJ. OpenMesh opens whatever a mtllib line names, resolves relative indices against the end of the file, loses its
-/// place at a coordinate that is no number and forgets which material a face had. So the text is first put into plain
-/// form: only v, vt and f lines, indices absolute and in range; materials are read here.
+/// OBJ. OpenMesh opens whatever a mtllib line names, resolves relative indices against the end of the file, misreads
+/// what follows a coordinate that is not a number and forgets which material a face had. So the text is first put into
+/// plain form: only v, vt and f lines, indices absolute and in range; materials are read here.
 namespace hilbrush {
 namespace {
 
@@ -62,7 +62,8 @@ class ObjLines {
  private:
   std::string_view text_, line_;
   std::string joined_;
-  int count_ = 0, number_ = 0;
+  int count_ = 0;   ///< lines read
+  int number_ = 0;  ///< of the line at hand
 };
 
 class ObjPlainer {
@@ -147,7 +148,8 @@ class ObjPlainer {
 
   void add_face(std::string_view rest) {
     corners_.clear();
-    bool has_uv = true, is_good = true;
+    bool has_uv = true;
+    bool is_good = true;
     for (std::string_view word; !(word = take_word(rest)).empty() && word.front() != '#';) {
       const std::size_t slash = std::min(word.find('/'), word.size());
       const auto v = number_in<long long>(word.substr(0, slash));
@@ -195,16 +197,22 @@ class ObjPlainer {
     material_ = found->second;
   }
 
-  // Looking for repeated points takes the square of it.
+  // The search for repeated points takes time that grows with its square.
   static constexpr std::size_t kCornerLimit = 4096;
 
   ObjLines lines_;
   const std::string& name_;
   const ModelLimits& limits_;
   PlainObj plain_;
-  std::string vertices_, faces_;
-  std::size_t vertex_count_ = 0, texture_vertex_count_ = 0, colored_count_ = 0, dropped_count_ = 0, short_count_ = 0;
-  int first_dropped_ = 0, first_short_ = 0;
+  std::string vertices_;
+  std::string faces_;
+  std::size_t vertex_count_ = 0;
+  std::size_t texture_vertex_count_ = 0;
+  std::size_t colored_count_ = 0;
+  std::size_t dropped_count_ = 0;
+  std::size_t short_count_ = 0;
+  int first_dropped_ = 0;  ///< line
+  int first_short_ = 0;    ///< line
   std::uint32_t material_ = 0;
   std::map<std::string, std::uint32_t> known_;
   std::vector<std::array<std::size_t, 2>> corners_;
@@ -246,8 +254,7 @@ void read_mtl(std::string_view text, std::map<std::string, MtlMaterial>& materia
       if (is_good) current->diffuse = color;
     } else if (key == "d" || key == "Tr") {
       const auto number = number_in<double>(take_word(rest));
-      // Some exporters write the opacity as Tr. A Tr of 1 would be a surface that nobody can see: it is taken as
-      // opaque.
+      // Some exporters write the opacity as Tr. A Tr of 1 would be an invisible surface: it is taken as opaque.
       const bool is_meant = number && std::isfinite(*number) && !(key == "Tr" && *number >= 1);
       if (is_meant) current->opacity = std::clamp(key == "d" ? *number : 1 - *number, 0., 1.);
     } else if (key == "map_Kd") {
@@ -322,9 +329,10 @@ std::vector<Look> looks_of(const PlainObj& plain, const std::string& name, Model
 std::vector<FaceList> split_by_material(const FaceList& faces, const std::vector<std::uint32_t>& material_of_face,
                                         std::size_t material_count) {
   std::vector<FaceList> lists(material_count);
-  std::vector<std::vector<std::uint32_t>> local(material_count);
-  std::vector<std::uint32_t> owner(faces.points.size(), 0), place(faces.points.size(), 0);
-  // Points are shared by few materials: the last owner's place is remembered, others get a copy, welded later.
+  // Points are shared by few materials: the index in the last owner's list is remembered, others get a copy, welded
+  // later.
+  std::vector<std::uint32_t> owner(faces.points.size(), 0);
+  std::vector<std::uint32_t> index(faces.points.size(), 0);
   for (std::size_t f = 0, c = 0; f < faces.face_ends.size(); ++f) {
     const std::uint32_t m = material_of_face[f];
     FaceList& list = lists[m];
@@ -332,10 +340,10 @@ std::vector<FaceList> split_by_material(const FaceList& faces, const std::vector
       const std::uint32_t v = faces.corners[c];
       if (owner[v] != m + 1) {
         owner[v] = m + 1;
-        place[v] = static_cast<std::uint32_t>(list.points.size());
+        index[v] = static_cast<std::uint32_t>(list.points.size());
         list.points.push_back(faces.points[v]);
       }
-      list.corners.push_back(place[v]);
+      list.corners.push_back(index[v]);
       if (!faces.corner_uv.empty()) list.corner_uv.push_back(faces.corner_uv[c]);
       if (!faces.corner_luminance.empty()) list.corner_luminance.push_back(faces.corner_luminance[c]);
     }
@@ -352,8 +360,8 @@ Model load_obj(std::string text, const std::string& name, ModelFolder& folder, c
   PlainObj plain = ObjPlainer(text, name, limits).run();
   std::string().swap(text);
   if (plain.material_of_face.empty()) {
-    for (const std::string& warning : plain.warnings) throw InputError(name, "there is no face in it; " + warning);
-    throw InputError(name, "there is no face in it");
+    const std::string cause = plain.warnings.empty() ? "" : "; " + plain.warnings.front();
+    throw InputError(name, "there is no face in it" + cause);
   }
   PolygonImporter importer(name, limits);
   read_with_openmesh(std::move(plain.text), name, false, [&](std::istream& in) {
@@ -361,9 +369,7 @@ Model load_obj(std::string text, const std::string& name, ModelFolder& folder, c
     if (plain.has_colors) options += OpenMesh::IO::Options::VertexColor;
     return OpenMesh::IO::OBJReader().read(in, importer, options);
   });
-  std::size_t dropped = 0;
-  std::vector<std::size_t> kept;
-  const FaceList faces = importer.take_faces(1, dropped, kept);
+  const FaceList faces = importer.take_polygons(1).faces;
   CHECK_EQ(importer.n_faces(), plain.material_of_face.size());
 
   Model model;

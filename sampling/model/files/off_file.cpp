@@ -4,8 +4,8 @@
 #include "sampling/model/files/mesh_file.h"
 #include "sampling/model/files/text_lines.h"
 
-/// OFF. OpenMesh's reader keeps what the last file's header said when it reads from memory, and knows no comments. The
-/// PLY that an OFF means is nearly the same text, so it is written anew as one, and read as one.
+/// OFF. OpenMesh's reader keeps what the last file's header said when it reads from memory, and knows no comments. A
+/// PLY with the same content is nearly the same text, so an OFF is rewritten as one, and read as one.
 namespace hilbrush {
 namespace {
 
@@ -33,8 +33,10 @@ class OffLines {
 };
 
 struct Header {
-  bool has_normals = false, has_uv = false;
-  std::size_t vertices = 0, faces = 0;
+  bool has_normals = false;
+  bool has_uv = false;
+  std::size_t vertices = 0;
+  std::size_t faces = 0;
 };
 
 Header read_header(OffLines& lines, const ModelLimits& limits) {
@@ -84,52 +86,70 @@ void append_color(std::string& text, const std::optional<std::array<int, 3>>& co
   text += '\n';
 }
 
-}  // namespace
+/// Lines of a PLY's body, and whether any of them has a color of its own.
+struct PlyLines {
+  std::string text;
+  bool have_colors = false;
+};
 
-Model load_off(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
-               const ModelLimits& limits) {
-  OffLines lines(text, name);
-  const Header header = read_header(lines, limits);
-  std::string vertices, faces;
-  bool have_colors = false, have_face_colors = false;
+PlyLines vertex_lines(OffLines& lines, const Header& header) {
+  PlyLines vertices;
   for (std::size_t i = 0; i < header.vertices; ++i) {
     std::string_view line = lines.next("vertex " + std::to_string(i + 1) + " of " + std::to_string(header.vertices));
     for (int c = 0; c < 3; ++c) {
       const std::string_view word = take_word(line);
       const auto number = number_in<double>(word);
       if (!number) lines.fail("expected three coordinates");
-      (vertices += std::isfinite(*number) ? std::string(word) : "9e37") += ' ';
+      vertices.text.append(std::isfinite(*number) ? word : "9e37") += ' ';  // out of range: its faces are dropped
     }
     for (int c = 0; header.has_normals && c < 3; ++c) take_word(line);
     const auto color = read_color(line);
-    have_colors = have_colors || color;
-    append_color(vertices, color);
+    vertices.have_colors = vertices.have_colors || color;
+    append_color(vertices.text, color);
   }
+  return vertices;
+}
+
+PlyLines face_lines(OffLines& lines, const Header& header) {
+  PlyLines faces;
   for (std::size_t i = 0; i < header.faces; ++i) {
     std::string_view line = lines.next("face " + std::to_string(i + 1) + " of " + std::to_string(header.faces));
     const auto count = number_in<std::uint32_t>(take_word(line));
     if (!count) lines.fail("expected the number of the face's corners");
-    faces += std::to_string(*count);
+    faces.text += std::to_string(*count);
     for (std::uint32_t c = 0; c < *count; ++c) {
       const auto index = number_in<std::uint32_t>(take_word(line));
       if (!index) lines.fail("expected the indices of the face's " + std::to_string(*count) + " corners");
-      (faces += ' ') += std::to_string(*index);
+      (faces.text += ' ') += std::to_string(*index);
     }
     const auto color = read_color(line);
-    have_face_colors = have_face_colors || color;
-    append_color(faces, color);
+    faces.have_colors = faces.have_colors || color;
+    append_color(faces.text, color);
   }
+  return faces;
+}
+
+/// Colors that no line has must not look like white ones: they get names that are not read.
+std::string color_properties(bool have_colors) {
+  return have_colors ? "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                     : "property uchar skip1\nproperty uchar skip2\nproperty uchar skip3\n";
+}
+
+}  // namespace
+
+Model load_off(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
+               const ModelLimits& limits) {
+  OffLines lines(text, name);
+  const Header header = read_header(lines, limits);
+  const PlyLines vertices = vertex_lines(lines, header);
+  const PlyLines faces = face_lines(lines, header);
   std::string().swap(text);
-  // Colors that no line has must not look like white ones.
-  const std::string color_names = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  const std::string ignored_names = "property uchar skip1\nproperty uchar skip2\nproperty uchar skip3\n";
   std::string ply = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(header.vertices) +
                     "\nproperty float x\nproperty float y\nproperty float z\n" +
-                    (have_colors ? color_names : ignored_names) + "element face " + std::to_string(header.faces) +
-                    "\nproperty list int uint vertex_indices\n" + (have_face_colors ? color_names : ignored_names) +
-                    "end_header\n";
-  ply += vertices;
-  ply += faces;
+                    color_properties(vertices.have_colors) + "element face " + std::to_string(header.faces) +
+                    "\nproperty list int uint vertex_indices\n" + color_properties(faces.have_colors) + "end_header\n";
+  ply += vertices.text;
+  ply += faces.text;
   return load_ply(std::move(ply), name, folder, read_image, limits);
 }
 

@@ -21,9 +21,10 @@ void read_with_openmesh(std::string bytes, const std::string& name, bool stops_a
     is_read = read(in);
   } catch (const std::ios_base::failure&) {
     throw InputError(
-        name, "the file ends early, holds something that is no number, or more or fewer numbers than its header says");
+        name,
+        "the file ends early, holds something that is not a number, or more or fewer numbers than its header says");
   }
-  if (!is_read) throw InputError(name, "the file can't be understood");
+  if (!is_read) throw InputError(name, "the file cannot be understood");
 }
 
 }  // namespace hilbrush

@@ -8,8 +8,8 @@
 #include "sampling/model/files/polygon_importer.h"
 #include "sampling/model/files/text_lines.h"
 
-/// PLY. OpenMesh believes the counts of the header, knows few names, and loses its place at a list it does not know. So
-/// the header is read and written anew here; the body goes to OpenMesh as it is.
+/// PLY. OpenMesh trusts the counts of the header, knows few names, and misreads what follows a list it does not know.
+/// So the header is read and rewritten here; the body goes to OpenMesh as it is.
 namespace hilbrush {
 namespace {
 
@@ -17,7 +17,9 @@ constexpr std::size_t kPropertyLimit = 256;
 constexpr std::size_t kTextureLimit = 1000;
 
 struct PlyProperty {
-  std::string type, name, count_type;  ///< count_type: of a list, else empty
+  std::string type;
+  std::string name;
+  std::string count_type;  ///< of a list, else empty
 };
 
 struct PlyElement {
@@ -146,7 +148,8 @@ class HeaderReader {
     properties.push_back(std::move(property));
   }
 
-  std::string_view text_, rest_;
+  std::string_view text_;
+  std::string_view rest_;
   const std::string& name_;
   const ModelLimits& limits_;
   PlyHeader header_;
@@ -167,7 +170,7 @@ bool has_property(const PlyElement& element, const std::string& name) {
                      [&](const PlyProperty& p) { return known_name(p.name) == name; });
 }
 
-/// One element's lists: only those that are understood, and only where OpenMesh does not lose its place.
+/// One element's lists: only those that are understood, and only where OpenMesh reads what follows them correctly.
 void check_lists(const PlyElement& element, const std::string& name) {
   bool has_indices = false;
   for (const PlyProperty& p : element.properties) {
@@ -246,12 +249,9 @@ std::string plain_header(const PlyHeader& header) {
   return text + "end_header\n";
 }
 
-}  // namespace
-
-Model load_ply(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
-               const ModelLimits& limits) {
-  const PlyHeader header = HeaderReader(text, name, limits).read();
-  check_header(header, name, text.size() - header.body);
+/// Reads the body with OpenMesh, after the header is replaced by the one it understands.
+FaceList read_body(std::string text, const PlyHeader& header, const std::string& name, const ModelLimits& limits,
+                   std::vector<std::string>& warnings) {
   const PlyElement& vertex = *find_element(header, "vertex");
   const PlyElement& face = *find_element(header, "face");
   text.replace(0, header.body, plain_header(header));
@@ -271,36 +271,51 @@ Model load_ply(std::string text, const std::string& name, ModelFolder& folder, c
     for (std::size_t f = 0; f < importer.n_faces(); ++f)
       if (const auto* uv = importer.face_property<std::vector<float>>("texcoord", f)) importer.set_face_uv(f, *uv);
   if (importer.n_vertices() < vertex.count || importer.n_faces() < face.count) fail(name, "the file ends early");
+  PolygonImporter::Polygons polygons = importer.take_polygons(1);
+  if (polygons.dropped > 0)
+    warnings.push_back(name + ": " + std::to_string(polygons.dropped) +
+                       " faces were dropped: they name points that do not exist");
+  return std::move(polygons.faces);
+}
 
-  Model model;
-  model.up = UpAxis::kZ;
-  std::size_t dropped = 0;
-  std::vector<std::size_t> kept;
-  FaceList faces = importer.take_faces(1, dropped, kept);
-  if (dropped > 0)
-    model.warnings.push_back(name + ": " + std::to_string(dropped) +
-                             " faces were dropped: they name points that do not exist");
-  MeshBuilder builder(limits);
-  Look look;
+/// The first of the header's textures that can be read, or -1; `warnings` says what is not used.
+int add_texture(const PlyHeader& header, const std::string& name, bool has_uv, ModelFolder& folder,
+                const ImageReader& read_image, const ModelLimits& limits, MeshBuilder& builder,
+                std::vector<std::string>& warnings) {
+  int index = -1;
   for (const std::string& texture : header.textures) {
     const auto file = folder.find(folder.path(), texture);
     auto image = file ? read_image(*file, limits.image_pixels) : Failure{file.reason()};
     if (image) {
       image->name = folder.name(*file);
-      look.texture = builder.add_texture(std::move(*image));
+      index = builder.add_texture(std::move(*image));
       folder.note(*file);
       break;
     }
-    model.warnings.push_back(name + ": the texture cannot be read (" + image.reason() + "); tried '" +
-                             texture.substr(0, 120) + "'");
+    warnings.push_back(name + ": the texture cannot be read (" + image.reason() + "); tried '" +
+                       texture.substr(0, 120) + "'");
   }
-  if (look.texture >= 0 && header.textures.size() > 1)
-    model.warnings.push_back(name + ": only one of the " + std::to_string(header.textures.size()) +
-                             " textures is used");
-  if (look.texture >= 0 && faces.corner_uv.empty()) {
-    look.texture = -1;
-    model.warnings.push_back(name + ": the texture is not used, as there are no texture coordinates");
-  }
+  if (index < 0) return -1;
+  if (header.textures.size() > 1)
+    warnings.push_back(name + ": only one of the " + std::to_string(header.textures.size()) + " textures is used");
+  if (has_uv) return index;
+  warnings.push_back(name + ": the texture is not used, as there are no texture coordinates");
+  return -1;
+}
+
+}  // namespace
+
+Model load_ply(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
+               const ModelLimits& limits) {
+  const PlyHeader header = HeaderReader(text, name, limits).read();
+  check_header(header, name, text.size() - header.body);
+  Model model;
+  model.up = UpAxis::kZ;
+  const FaceList faces = read_body(std::move(text), header, name, limits, model.warnings);
+  MeshBuilder builder(limits);
+  Look look;
+  look.texture =
+      add_texture(header, name, !faces.corner_uv.empty(), folder, read_image, limits, builder, model.warnings);
   builder.add(faces, Eigen::Affine3d::Identity(), look);
   model.mesh = builder.finish(model.warnings);
   if (model.mesh.triangles.empty()) fail(name, "there is no usable face in it");

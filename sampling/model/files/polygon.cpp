@@ -10,9 +10,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Corner tests in all polygons of one cutter: about a second.
+/// Corner tests in all polygons of one cutter; they take about a second.
 constexpr std::size_t kWorkLimit = 200'000'000;
-/// Ears flatter than this, times the squared extent, are cut last.
+/// Twice the area of an ear over the squared extent of its polygon: flatter ears are cut last.
 constexpr double kFlatTurn = 1e-9;
 
 double turn(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
@@ -42,17 +42,20 @@ void PolygonCutter::project(const std::vector<Vector3d>& corners) {
     flat_.emplace_back(corner[x] - origin[x], corner[y] - origin[y]);
     extent = std::max(extent, flat_.back().squaredNorm());
   }
-  least_turn_ = kFlatTurn * extent;
+  min_turn_ = kFlatTurn * extent;
 }
 
 bool PolygonCutter::is_convex() const {
   const std::size_t n = flat_.size();
   double total_turn = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const Vector2d &a = flat_[i], &b = flat_[(i + 1) % n], &c = flat_[(i + 2) % n];
-    // A flat corner is no place to fan from: it would make a triangle without area, and a hole once that is dropped.
-    if (!(turn(a, b, c) > least_turn_)) return false;
-    const Vector2d u = b - a, v = c - b;
+    const Vector2d& a = flat_[i];
+    const Vector2d& b = flat_[(i + 1) % n];
+    const Vector2d& c = flat_[(i + 2) % n];
+    // A fan over a flat corner would have a triangle without area, and a hole once that is dropped.
+    if (!(turn(a, b, c) > min_turn_)) return false;
+    const Vector2d u = b - a;
+    const Vector2d v = c - b;
     total_turn += std::atan2(u.x() * v.y() - u.y() * v.x(), u.dot(v));
   }
   // A star turns the same way everywhere, but more than once around.
@@ -82,12 +85,14 @@ const std::vector<PolygonCutter::Triangle>& PolygonCutter::cut(const std::vector
 }
 
 bool PolygonCutter::is_ear(std::size_t corner) const {
-  const Vector2d &a = flat_[previous_[corner]], &b = flat_[corner], &c = flat_[next_[corner]];
-  if (!(turn(a, b, c) > least_turn_)) return false;
+  const Vector2d& a = flat_[previous_[corner]];
+  const Vector2d& b = flat_[corner];
+  const Vector2d& c = flat_[next_[corner]];
+  if (!(turn(a, b, c) > min_turn_)) return false;
   for (const std::size_t other : reflex_) {
     const Vector2d& p = flat_[other];
     ++work_;
-    // A corner that coincides with one of the ear's does not stand in its way: bridges to holes visit a place twice.
+    // A corner that coincides with one of the ear's does not block it: bridges to holes visit a point twice.
     if (p != a && p != b && p != c && is_inside(p, a, b, c)) return false;
   }
   return true;
@@ -99,15 +104,17 @@ void PolygonCutter::cut_ears() {
   for (std::size_t i = 0; i < flat_.size(); ++i)
     if (is_reflex(i)) reflex_.push_back(i);
 
-  std::size_t count = flat_.size(), corner = 0, misses = 0;
+  std::size_t count = flat_.size();
+  std::size_t corner = 0;
+  std::size_t misses = 0;
   while (count > 3) {
     if (work_ > kWorkLimit) {
       ++given_up_;
       break;
     }
     if (misses > count) {
-      if (least_turn_ == 0) break;
-      least_turn_ = 0;
+      if (min_turn_ == 0) break;
+      min_turn_ = 0;
       misses = 0;
     }
     if (!is_ear(corner)) {

@@ -28,9 +28,11 @@ class PolygonCutter {
   void fan_rest(std::size_t start, std::size_t count);
 
   std::vector<Eigen::Vector2d> flat_;
-  std::vector<std::size_t> next_, previous_, reflex_;
+  std::vector<std::size_t> next_;
+  std::vector<std::size_t> previous_;
+  std::vector<std::size_t> reflex_;
   std::vector<Triangle> triangles_;
-  double least_turn_ = 0;
+  double min_turn_ = 0;
   std::size_t given_up_ = 0;
   mutable std::size_t work_ = 0;
 };

@@ -7,10 +7,10 @@
 namespace hilbrush {
 namespace {
 
-/// The place of a handle in a list that is made long enough for `count` when first used; null for a handle from
-/// nowhere.
+/// The entry of a handle in a list that is made long enough for `count` when first used; null if the handle is not one
+/// of the first `count`.
 template <class T, class Handle>
-T* place_in(std::vector<T>& list, std::size_t count, Handle handle, const T& empty) {
+T* entry_in(std::vector<T>& list, std::size_t count, Handle handle, const T& empty) {
   if (handle.idx() < 0 || static_cast<std::size_t>(handle.idx()) >= count) return nullptr;
   if (list.size() < count) list.resize(count, empty);
   return &list[static_cast<std::size_t>(handle.idx())];
@@ -60,23 +60,22 @@ void PolygonImporter::add_face_texcoords(FaceHandle f, VertexHandle, const std::
 }
 
 void PolygonImporter::set_texcoord(VertexHandle v, const OpenMesh::Vec2f& uv) {
-  if (auto* place = place_in(vertex_uv_, points_.size(), v, Eigen::Vector2d(0, 0))) *place = {uv[0], uv[1]};
+  if (auto* entry = entry_in(vertex_uv_, points_.size(), v, Eigen::Vector2d(0, 0))) *entry = {uv[0], uv[1]};
 }
 
 void PolygonImporter::set_vertex_color(VertexHandle v, double red, double green, double blue) {
-  if (float* place = place_in(vertex_luminance_, points_.size(), v, -1.f)) *place = luminance_of_srgb(red, green, blue);
+  if (float* entry = entry_in(vertex_luminance_, points_.size(), v, -1.f)) *entry = luminance_of_srgb(red, green, blue);
 }
 
 void PolygonImporter::set_face_color(FaceHandle f, double red, double green, double blue) {
-  if (float* place = place_in(face_luminance_, face_ends_.size(), f, -1.f))
-    *place = luminance_of_srgb(red, green, blue);
+  if (float* entry = entry_in(face_luminance_, face_ends_.size(), f, -1.f))
+    *entry = luminance_of_srgb(red, green, blue);
 }
 
-FaceList PolygonImporter::take_faces(float luminance_otherwise, std::size_t& dropped, std::vector<std::size_t>& kept) {
-  FaceList faces;
+PolygonImporter::Polygons PolygonImporter::take_polygons(float luminance_otherwise) {
+  Polygons polygons;
+  FaceList& faces = polygons.faces;
   faces.at = name_;
-  dropped = 0;
-  kept.clear();
   const bool has_colors = !vertex_luminance_.empty() || !face_luminance_.empty();
   const auto luminance_at = [&](std::uint32_t v, std::size_t f) {
     const float of_vertex = v < vertex_luminance_.size() ? vertex_luminance_[v] : -1;
@@ -87,7 +86,7 @@ FaceList PolygonImporter::take_faces(float luminance_otherwise, std::size_t& dro
     const auto first = corners_.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = corners_.begin() + static_cast<std::ptrdiff_t>(face_ends_[f]);
     if (std::any_of(first, last, [&](std::uint32_t v) { return v >= points_.size(); })) {
-      ++dropped;
+      ++polygons.dropped;
       continue;
     }
     for (std::size_t c = begin; c < face_ends_[f]; ++c) {
@@ -100,10 +99,9 @@ FaceList PolygonImporter::take_faces(float luminance_otherwise, std::size_t& dro
         faces.corner_uv.push_back(v < vertex_uv_.size() ? vertex_uv_[v] : Eigen::Vector2d(0, 0));
     }
     faces.end_face();
-    kept.push_back(f);
   }
   faces.points = std::move(points_);
-  return faces;
+  return polygons;
 }
 
 }  // namespace hilbrush

@@ -8,7 +8,8 @@
 namespace hilbrush {
 
 /// Takes what OpenMesh's file readers deliver as plain polygons. No connectivity is built, so nothing is split, dropped
-/// or left uninitialized; every face gets a valid handle, because the readers lose their place after a refused one.
+/// or left uninitialized. Every face gets a valid handle, because the readers attach the data of later faces to the
+/// wrong ones after a refused face.
 class PolygonImporter : public OpenMesh::IO::BaseImporter {
  public:
   using FaceHandle = OpenMesh::FaceHandle;
@@ -19,9 +20,12 @@ class PolygonImporter : public OpenMesh::IO::BaseImporter {
   /// @throws InputError at `name` from the callbacks once a limit is exceeded.
   PolygonImporter(std::string name, const ModelLimits& limits) : name_(std::move(name)), limits_(limits) {}
 
-  /// The polygons; faces with corners that do not exist are dropped and counted in `dropped`. `luminance_otherwise` is
-  /// for what has no color. Vertex colors go before face colors. `kept` gets the number that each kept face had.
-  FaceList take_faces(float luminance_otherwise, std::size_t& dropped, std::vector<std::size_t>& kept);
+  struct Polygons {
+    FaceList faces;
+    std::size_t dropped = 0;  ///< faces with corners that do not exist; they are not in `faces`
+  };
+  /// Hands over what was read. `luminance_otherwise` is for what has no color. Vertex colors go before face colors.
+  Polygons take_polygons(float luminance_otherwise);
 
   /// A face property that the file brought along, by name; null if there is none of that name and type.
   template <class T>
@@ -104,7 +108,8 @@ class PolygonImporter : public OpenMesh::IO::BaseImporter {
       vertex_count = count;
       vprops_resize(count);
     }
-    std::size_t vertex_count = 0, face_count = 0;
+    std::size_t vertex_count = 0;
+    std::size_t face_count = 0;
   };
 
   void set_vertex_color(VertexHandle v, double red, double green, double blue);

@@ -13,7 +13,9 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 80, kTriangleBytes = 50;
+constexpr std::size_t kHeaderBytes = 80;
+constexpr std::size_t kTriangleBytes = 50;
+constexpr double kMaxCoordinate = 1e30;  ///< in units of the file, as in face_list.cpp
 
 std::uint32_t count_of(const std::string& bytes) {
   std::uint32_t count = 0;
@@ -47,68 +49,100 @@ std::size_t clean_binary(std::string& bytes, const std::string& name, const Mode
     bool is_finite = true;
     for (std::size_t i = 3; i < 12; ++i) is_finite = is_finite && std::isfinite(numbers[i]);
     if (!is_finite) continue;
-    std::memmove(bytes.data() + kHeaderBytes + 4 + kTriangleBytes * kept++, triangle, kTriangleBytes);
+    std::memmove(bytes.data() + kHeaderBytes + 4 + kTriangleBytes * kept, triangle, kTriangleBytes);
+    ++kept;
   }
   bytes.resize(kHeaderBytes + 4 + kTriangleBytes * kept);
   for (std::size_t i = 0; i < 4; ++i) bytes[kHeaderBytes + i] = static_cast<char>(kept >> (8 * i) & 255u);
   return count - kept;
 }
 
-/// The triangles of an ASCII file in the form that OpenMesh looks for; what is not finite is counted in `dropped`.
-std::string clean_text(std::string_view text, const std::string& name, const ModelLimits& limits,
-                       std::size_t& dropped) {
-  std::string plain, triangle;
-  std::size_t count = 0;
-  int corners = 0, number = 0;
-  bool is_finite = true;
-  while (const auto line = take_line(text)) {
-    ++number;
-    std::string_view rest = *line;
-    const std::string key = lower_case(take_word(rest));
-    const std::string at = name + ":" + std::to_string(number);
+/// Puts an ASCII file into the form that OpenMesh looks for. Triangles that are not finite are left out and counted.
+class AsciiStlReader {
+ public:
+  AsciiStlReader(std::string_view text, const std::string& name, const ModelLimits& limits)
+      : text_(text), name_(name), limits_(limits) {}
+
+  std::string read() {
+    while (const auto line = take_line(text_)) {
+      ++line_number_;
+      read_line(*line);
+    }
+    if (corners_ > 0) fail("the file ends inside a facet");
+    return std::move(plain_);
+  }
+  std::size_t dropped() const { return dropped_; }
+
+ private:
+  [[noreturn]] void fail(const std::string& sentence) const {
+    throw InputError(name_ + ":" + std::to_string(line_number_), sentence);
+  }
+
+  void read_line(std::string_view line) {
+    const std::string key = lower_case(take_word(line));
     if (key == "outer") {
-      triangle.clear();
-      corners = 0;
-      is_finite = true;
+      triangle_.clear();
+      corners_ = 0;
+      is_finite_ = true;
     } else if (key == "vertex") {
-      if (++corners > 3) throw InputError(at, "a facet has more than three corners");
-      triangle += "vertex";
-      for (int i = 0; i < 3; ++i) {
-        const std::string_view word = take_word(rest);
-        const auto value = number_in<double>(word);
-        if (!value) throw InputError(at, "expected three coordinates after vertex");
-        is_finite = is_finite && std::abs(*value) < 1e30;
-        (triangle += ' ').append(word);
-      }
-      triangle += '\n';
+      add_corner(line);
     } else if (key == "endloop") {
-      if (corners != 3) throw InputError(at, "a facet has " + std::to_string(corners) + " corners, not three");
-      corners = 0;
-      if (!is_finite) {
-        ++dropped;
-        continue;
-      }
-      if (++count > limits.triangles)
-        throw InputError(at, "the model has more triangles than the limit of " + std::to_string(limits.triangles));
-      (plain += "outer loop\n") += triangle;
+      end_triangle();
     } else if (!key.empty() && key != "solid" && key != "facet" && key != "endfacet" && key != "endsolid") {
-      throw InputError(at, "expected solid, facet, outer loop, vertex, endloop, endfacet or endsolid, found '" +
-                               key.substr(0, 40) + "'");
+      fail("expected solid, facet, outer loop, vertex, endloop, endfacet or endsolid, found '" + key.substr(0, 40) +
+           "'");
     }
   }
-  if (corners > 0) throw InputError(name + ":" + std::to_string(number), "the file ends inside a facet");
-  return plain;
-}
+
+  void add_corner(std::string_view coordinates) {
+    if (++corners_ > 3) fail("a facet has more than three corners");
+    triangle_ += "vertex";
+    for (int i = 0; i < 3; ++i) {
+      const std::string_view word = take_word(coordinates);
+      const auto value = number_in<double>(word);
+      if (!value) fail("expected three coordinates after vertex");
+      is_finite_ = is_finite_ && std::abs(*value) < kMaxCoordinate;
+      (triangle_ += ' ').append(word);
+    }
+    triangle_ += '\n';
+  }
+
+  void end_triangle() {
+    if (corners_ != 3) fail("a facet has " + std::to_string(corners_) + " corners, not three");
+    corners_ = 0;
+    if (!is_finite_) {
+      ++dropped_;
+      return;
+    }
+    if (++count_ > limits_.triangles)
+      fail("the model has more triangles than the limit of " + std::to_string(limits_.triangles));
+    (plain_ += "outer loop\n") += triangle_;
+  }
+
+  std::string_view text_;
+  const std::string& name_;
+  const ModelLimits& limits_;
+  std::string plain_;
+  std::string triangle_;
+  std::size_t count_ = 0;
+  std::size_t dropped_ = 0;
+  int line_number_ = 0;
+  int corners_ = 0;
+  bool is_finite_ = true;
+};
 
 }  // namespace
 
 Model load_stl(std::string text, const std::string& name, const ModelLimits& limits) {
   std::size_t not_finite = 0;
   const bool binary = is_binary(text);
-  if (binary)
+  if (binary) {
     not_finite = clean_binary(text, name, limits);
-  else
-    text = clean_text(text, name, limits, not_finite);
+  } else {
+    AsciiStlReader reader(text, name, limits);
+    text = reader.read();
+    not_finite = reader.dropped();
+  }
 
   PolygonImporter importer(name, limits);
   read_with_openmesh(std::move(text), name, binary, [&](std::istream& in) {
@@ -120,9 +154,7 @@ Model load_stl(std::string text, const std::string& name, const ModelLimits& lim
   if (not_finite > 0)
     model.warnings.push_back(name + ": " + std::to_string(not_finite) +
                              " triangles with coordinates out of range were dropped");
-  std::size_t dropped = 0;
-  std::vector<std::size_t> kept;
-  const FaceList faces = importer.take_faces(1, dropped, kept);
+  const FaceList faces = importer.take_polygons(1).faces;
   MeshBuilder builder(limits);
   builder.add(faces, Eigen::Affine3d::Identity(), Look());
   model.mesh = builder.finish(model.warnings);
