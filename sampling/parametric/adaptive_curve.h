@@ -87,7 +87,7 @@ class AdaptiveCurve {
   using FineGrid = std::array<Eigen::Vector3d, kFineSide * kFineSide>;
 
   static NodeType child(const NodeType& node, unsigned i) {
-    const unsigned place = node.quad.place(i);
+    const unsigned place = node.quad.slot(i);
     NodeType next;
     next.x = kSide * node.x + place % kSide;
     next.y = kSide * node.y + place / kSide;

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "sampling/base/enum_names.h"
 #include "sampling/options/sample_options.h"
 
 /// Dots on surfaces that are given by a formula, as in chapters 4 and 5 of the thesis:
@@ -53,6 +53,18 @@ enum class ParametricShape {
   kSuperEllipsoidReparameterized,  ///< the same surface after a power law in u and v (section 4.5)
   kEqualAreaSphere                 ///< the sphere after the reparameterization of equation 5.3
 };
+
+inline constexpr EnumName<ParametricShape> kParametricShapeNames[] = {
+    {ParametricShape::kPlane, "plane"},
+    {ParametricShape::kSphere, "sphere"},
+    {ParametricShape::kMonkeySaddle, "monkey_saddle"},
+    {ParametricShape::kEightSurface, "eight_surface"},
+    {ParametricShape::kWhitneyUmbrella, "whitney_umbrella"},
+    {ParametricShape::kSuperEllipsoid, "super_ellipsoid"},
+    {ParametricShape::kSuperEllipsoidReparameterized, "super_ellipsoid_reparameterized"},
+    {ParametricShape::kEqualAreaSphere, "equal_area_sphere"},
+};
+
 std::unique_ptr<ParametricSurface> make_surface(ParametricShape shape);
 
 /// Relative density of dots: only its proportions count.
@@ -65,6 +77,14 @@ enum class ParametricDensity {
                        ///< Whitney umbrella's pinch would take all dots otherwise, and the thesis does not say
 };
 
+inline constexpr EnumName<ParametricDensity> kParametricDensityNames[] = {
+    {ParametricDensity::kConstant, "constant"},
+    {ParametricDensity::kU, "u"},
+    {ParametricDensity::kUPlusV, "u+v"},
+    {ParametricDensity::kMeanCurvature, "mean_curvature"},
+    {ParametricDensity::kGaussianCurvature, "gaussian_curvature"},
+};
+
 /// How the area of a leaf of the curve is found (section 4.3).
 enum class AreaMethod {
   kTriangle,  ///< (a) of the vertex and the two next to it along the curve; zero where the curve runs straight
@@ -72,12 +92,11 @@ enum class AreaMethod {
   kFirstFundamentalForm,  ///< (c) sqrt(EG - F^2) at the vertex times the leaf's size; (b) where that is not finite
 };
 
-/// Names for settings and reports: "plane", "sphere", "monkey_saddle", "eight_surface", "whitney_umbrella",
-/// "super_ellipsoid", "super_ellipsoid_reparameterized", "equal_area_sphere"; "constant", "u", "u+v", "mean_curvature",
-/// "gaussian_curvature"; "triangle", "square", "first_fundamental_form". Indexed by the enumerators.
-const std::vector<std::string>& parametric_shape_names();
-const std::vector<std::string>& parametric_density_names();
-const std::vector<std::string>& area_method_names();
+inline constexpr EnumName<AreaMethod> kAreaMethodNames[] = {
+    {AreaMethod::kTriangle, "triangle"},
+    {AreaMethod::kSquare, "square"},
+    {AreaMethod::kFirstFundamentalForm, "first_fundamental_form"},
+};
 
 struct ParametricOptions {
   std::uint64_t dot_count = 0;

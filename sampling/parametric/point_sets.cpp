@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "sampling/base/input_error.h"
 #include "sampling/curve/sequence.h"
@@ -79,11 +80,6 @@ std::vector<Vector2d> one_by_one(std::uint64_t count, Point point) {
 }
 
 }  // namespace
-
-const std::vector<std::string>& plane_set_names() {
-  static const std::vector<std::string> names{"random", "jittered", "halton", "hammersley", "sobol", "niederreiter"};
-  return names;
-}
 
 std::vector<Vector2d> plane_set(PlaneSet set, std::uint64_t count, std::uint64_t seed) {
   if (count > kMaxPoints) throw InputError("count", "is above " + std::to_string(kMaxPoints));

@@ -1,8 +1,9 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
-#include <string>
 #include <vector>
+
+#include "sampling/base/enum_names.h"
 
 /// Point sets made for the unit square: what the thesis compares its own with (sections 2.1.2 and 5.1.3).
 namespace hilbrush {
@@ -17,8 +18,10 @@ enum class PlaneSet {
   kNiederreiter,  ///< ACM algorithm 738 in base 2, the first 100 points dropped
 };
 
-/// "random", "jittered", "halton", "hammersley", "sobol", "niederreiter"; indexed by PlaneSet.
-const std::vector<std::string>& plane_set_names();
+inline constexpr EnumName<PlaneSet> kPlaneSetNames[] = {
+    {PlaneSet::kRandom, "random"},         {PlaneSet::kJittered, "jittered"}, {PlaneSet::kHalton, "halton"},
+    {PlaneSet::kHammersley, "hammersley"}, {PlaneSet::kSobol, "sobol"},       {PlaneSet::kNiederreiter, "niederreiter"},
+};
 
 /// The set's points in order of their making; `seed` matters to kRandom and kJittered alone. Cost O(N), up to 2^31
 /// points. In two dimensions Sobol's and Niederreiter's matrices are the same (their polynomials are x and x + 1), and

@@ -95,11 +95,6 @@ double correlation_of(const std::vector<Vector2d>& pairs) {
 
 }  // namespace
 
-const char* plane_curve_name(PlaneCurve curve) {
-  constexpr std::array kNames{"hilbert", "peano2", "z", "rows"};
-  return kNames[static_cast<std::size_t>(curve)];
-}
-
 Coherence spatial_coherence(PlaneCurve curve, int depth, const TestShapes& pairs) {
   CHECK(depth >= 1 && depth <= (curve == PlaneCurve::kPeano2 ? 10 : 16));
   const std::uint64_t count = vertex_count(curve, depth);

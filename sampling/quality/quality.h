@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "sampling/base/enum_names.h"
 #include "sampling/dots/dots.h"
 #include "sampling/model/textured_mesh.h"
 #include "sampling/tone/tone_field.h"
@@ -146,7 +146,17 @@ class SurfaceQuality {
 /// Section 5.4: distance along a curve through the unit square (as a share of its length) against straight distance,
 /// for random pairs of its vertices.
 enum class PlaneCurve { kHilbert, kPeano2, kZ, kRows };
-const char* plane_curve_name(PlaneCurve curve);  ///< "hilbert", "peano2", "z", "rows"
+
+inline constexpr EnumName<PlaneCurve> kPlaneCurveNames[] = {
+    {PlaneCurve::kHilbert, "hilbert"},
+    {PlaneCurve::kPeano2, "peano2"},
+    {PlaneCurve::kZ, "z"},
+    {PlaneCurve::kRows, "rows"},
+};
+
+inline const char* plane_curve_name(PlaneCurve curve) {
+  return name_of(kPlaneCurveNames, curve);
+}
 
 struct Coherence {
   std::vector<Eigen::Vector2d> pairs;  ///< (straight distance, share of the curve between)

@@ -49,9 +49,9 @@ void time_sphere(std::uint64_t count, AnswerHash& hash) {
                             std::sqrt(static_cast<double>(count) * 4 * std::numbers::pi);
         hash.take(path);
         std::printf("%-8s %-22s %10llu %.9f %7.4f %6.2f  %s\n", curve == CurveKind::kHilbert ? "hilbert" : "peano2",
-                    area_method_names()[static_cast<std::size_t>(method)].c_str(),
-                    static_cast<unsigned long long>(samples.vertex_count), samples.area / (4 * std::numbers::pi), path,
-                    seconds, sampler == Sampler::kCentroid ? "centroid" : "jittered");
+                    name_of(kAreaMethodNames, method), static_cast<unsigned long long>(samples.vertex_count),
+                    samples.area / (4 * std::numbers::pi), path, seconds,
+                    sampler == Sampler::kCentroid ? "centroid" : "jittered");
       }
 }
 

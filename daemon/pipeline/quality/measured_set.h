@@ -41,6 +41,13 @@ std::unique_ptr<MeasuredSet> make_measured_set(const QualityRequest& request);
 std::size_t choice_of(const std::string& name, const std::vector<std::string>& names, std::size_t otherwise,
                       const std::string& path);
 
+/// The value named `name` in a table of names, or `otherwise` if it is empty. @throws InputError at `path`.
+template <class Enum, std::size_t kCount>
+Enum choice_in(const EnumName<Enum> (&names)[kCount], const std::string& name, Enum otherwise,
+               const std::string& path) {
+  return name.empty() ? otherwise : names[choice_of(name, all_names(names), 0, path)].value;
+}
+
 std::unique_ptr<MeasuredSet> make_parametric_set(const QualityRequest& request, ParametricShape shape);
 std::unique_ptr<MeasuredSet> make_model_set(const QualityRequest& request);
 std::unique_ptr<MeasuredSet> make_dots_set(const QualityRequest& request);

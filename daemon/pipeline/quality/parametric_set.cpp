@@ -39,10 +39,8 @@ class ParametricSet : public MeasuredSet {
     options_.sampler = request.sampler.empty() ? Sampler::kCentroid : sampler_named(request.sampler);
     options_.curve =
         choice_of(request.curve, {"hilbert", "peano2"}, 0, "$.curve") == 0 ? CurveKind::kHilbert : CurveKind::kPeano2;
-    options_.area = static_cast<AreaMethod>(choice_of(
-        request.area, area_method_names(), static_cast<std::size_t>(AreaMethod::kFirstFundamentalForm), "$.area"));
-    options_.density =
-        static_cast<ParametricDensity>(choice_of(request.density, parametric_density_names(), 0, "$.density"));
+    options_.area = choice_in(kAreaMethodNames, request.area, AreaMethod::kFirstFundamentalForm, "$.area");
+    options_.density = choice_in(kParametricDensityNames, request.density, ParametricDensity::kConstant, "$.density");
     options_.seed = request.seed;
     if (!request.points.empty()) use_point_set(request);
     // 128 by 128 quads: the triangles of a sphere are off by 1.5e-4 of its radius. The plane needs only two triangles.
@@ -96,7 +94,7 @@ class ParametricSet : public MeasuredSet {
     for (const auto& [name, path] : {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
                                      std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"}})
       if (!name.empty()) throw InputError(path, "has no effect on points, which are not placed along a curve");
-    point_set_ = static_cast<PlaneSet>(choice_of(request.points, plane_set_names(), 0, "$.points"));
+    point_set_ = choice_in(kPlaneSetNames, request.points, PlaneSet::kRandom, "$.points");
   }
 
   Dot dot_at(const Vector3d& position) const {

@@ -124,9 +124,9 @@ std::string run_quality(const QualityRequest& request, const std::filesystem::pa
 
 std::unique_ptr<MeasuredSet> make_measured_set(const QualityRequest& request) {
   if (!request.model.empty()) return make_dots_set(request);
-  const auto& names = parametric_shape_names();
+  const std::vector<std::string> names = all_names(kParametricShapeNames);
   if (const auto found = std::find(names.begin(), names.end(), request.set); found != names.end())
-    return make_parametric_set(request, static_cast<ParametricShape>(found - names.begin()));
+    return make_parametric_set(request, kParametricShapeNames[found - names.begin()].value);
   std::error_code error;
   if (std::filesystem::exists(request.set, error)) return make_model_set(request);
   std::string known;

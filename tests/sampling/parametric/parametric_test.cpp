@@ -19,12 +19,12 @@ using test::kPi;
 
 std::vector<ParametricShape> all_shapes() {
   std::vector<ParametricShape> shapes;
-  for (std::size_t i = 0; i < parametric_shape_names().size(); ++i) shapes.push_back(static_cast<ParametricShape>(i));
+  for (const auto& [shape, name] : kParametricShapeNames) shapes.push_back(shape);
   return shapes;
 }
 
-const std::string& name_of(ParametricShape shape) {
-  return parametric_shape_names()[static_cast<std::size_t>(shape)];
+const char* name_of(ParametricShape shape) {
+  return name_of(kParametricShapeNames, shape);
 }
 
 TEST(ParametricSurface, DerivativesAreThoseOfThePosition) {

@@ -81,15 +81,15 @@ TEST(PlaneSet, SeedsDifferAndRepeat) {
 }
 
 TEST(SphereSet, EqualAreas) {
-  for (std::size_t s = 0; s < plane_set_names().size(); ++s) {
-    const auto points = sphere_set(static_cast<PlaneSet>(s), 10'000, 1);
+  for (const auto& [set, name] : kPlaneSetNames) {
+    const auto points = sphere_set(set, 10'000, 1);
     const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 3).normalized();
     double inside = 0;
     for (const auto& p : points) {
       EXPECT_NEAR(p.norm(), 1, 1e-12);
       inside += p.dot(axis) > .6;
     }
-    EXPECT_NEAR(inside / static_cast<double>(points.size()), .2, .02) << plane_set_names()[s];
+    EXPECT_NEAR(inside / static_cast<double>(points.size()), .2, .02) << name;
   }
 }
 
