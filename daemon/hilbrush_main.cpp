@@ -16,7 +16,7 @@ int terminal_width() {
 
 }  // namespace
 
-/// The operator's command, see daemon/commands/command_line.h.
+/// The operator's command: see daemon/commands/command_line.h.
 int main(int argc, char** argv) {
   hilbrush::Terminal terminal{
       std::cout, std::cerr, std::cin, isatty(STDOUT_FILENO) == 1, isatty(STDIN_FILENO) == 1, terminal_width()};

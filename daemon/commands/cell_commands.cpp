@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Clearing, arming and homing are answered when they are done: a laser's start delay and a slow axis have to fit.
+/// Clearing, arming and homing are answered when they are done: long enough for a laser's start delay and a slow axis.
 constexpr auto kMotionTimeout = std::chrono::seconds(120);
 constexpr auto kAnswerTimeout = std::chrono::seconds(10);
 
@@ -23,7 +23,7 @@ struct CellCommand {
   std::chrono::seconds timeout;
 };
 
-int ask_daemon(const CommandContext& context, const CellCommand& command) {
+int call_daemon(const CommandContext& context, const CellCommand& command) {
   RpcClient client(context.socket_path);
   const Json result = client.call(command.method, Json(), command.timeout);
   const std::string method = command.method;
@@ -43,18 +43,18 @@ int ask_daemon(const CommandContext& context, const CellCommand& command) {
 
 void add_cell_commands(CLI::App& app, CommandContext& context) {
   static constexpr std::array kCommands{
-      CellCommand{"status", "cell.status", "say what the cell is doing", kAnswerTimeout},
-      CellCommand{"stop", "cell.stop", "turn the laser off and stop all motion, now; latches until clear",
+      CellCommand{"status", "cell.status", "show the state of the cell and its devices", kAnswerTimeout},
+      CellCommand{"stop", "cell.stop", "turn the laser off and stop all motion at once; stays so until clear",
                   kAnswerTimeout},
-      CellCommand{"clear", "cell.clear", "release a stop or a fault, once its cause is gone", kMotionTimeout},
-      CellCommand{"arm", "cell.arm", "make the cell ready to paint: devices enabled, laser armed", kMotionTimeout},
+      CellCommand{"clear", "cell.clear", "clear a stop or a fault whose cause is gone", kMotionTimeout},
+      CellCommand{"arm", "cell.arm", "make the cell ready to paint: enable the devices, arm the laser", kMotionTimeout},
       CellCommand{"home", "cell.home", "move all axes to their home positions, laser off", kMotionTimeout},
-      CellCommand{"info", "system.info", "say which daemon answers: version, cell, folders, limits", kAnswerTimeout},
+      CellCommand{"info", "system.info", "show the daemon's version, cell, folders and limits", kAnswerTimeout},
   };
   for (const CellCommand& entry : kCommands) {
     CLI::App* command = add_daemon_command(app, context, entry.name, entry.description);
     command->callback(
-        [&context, &entry] { context.action = [&context, &entry] { return ask_daemon(context, entry); }; });
+        [&context, &entry] { context.action = [&context, &entry] { return call_daemon(context, entry); }; });
   }
 }
 

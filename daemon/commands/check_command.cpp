@@ -15,7 +15,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct CheckFlags {
-  std::string cell_file, cell = "default", settings_file;
+  std::string cell_file;
+  std::string cell = "default";
+  std::string settings_file;
 };
 
 int check_settings(const CommandContext& context, const std::string& file) {
@@ -53,10 +55,10 @@ int check_cell(const CommandContext& context, const CheckFlags& flags) {
 void add_check_command(CLI::App& app, CommandContext& context) {
   auto flags = std::make_shared<CheckFlags>();
   CLI::App* command =
-      add_command(app, context, "check-config", "read a cell's file strictly and say what is wrong with it");
-  auto* file = command->add_option("FILE", flags->cell_file, "a cell's file");
-  auto* cell = command->add_option("--cell", flags->cell, "or: the name of a cell (default: default)");
-  auto* settings = command->add_option("--settings", flags->settings_file, "or: a file with the settings of a job");
+      add_command(app, context, "check-config", "check a cell file, or the settings of a job, and show what is wrong");
+  auto* file = command->add_option("FILE", flags->cell_file, "a cell file");
+  auto* cell = command->add_option("--cell", flags->cell, "instead: the name of a cell (default: default)");
+  auto* settings = command->add_option("--settings", flags->settings_file, "instead: a file with settings of a job");
   file->excludes(cell)->excludes(settings);
   cell->excludes(settings);
   command->callback([&context, flags] {

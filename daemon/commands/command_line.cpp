@@ -44,7 +44,7 @@ int exit_code_of(int rpc_error) {
   }
 }
 
-/// The sentence on standard error; with --json also as an object on standard output.
+/// Prints the sentence on standard error; with --json also as an object on standard output.
 int report_failure(const CommandContext& context, int exit_code, const std::string& at, const std::string& sentence) {
   context.terminal.err << "hilbrush: " << printable(at.empty() ? sentence : at + ": " + sentence) << std::endl;
   if (context.is_json) {
@@ -54,7 +54,7 @@ int report_failure(const CommandContext& context, int exit_code, const std::stri
   return exit_code;
 }
 
-/// What a failed child said on its standard error, set off from our own words.
+/// Prints what a failed child wrote to its standard error, each line marked as a quotation.
 void quote_child(const CommandContext& context, const std::string& child_stderr) {
   for (std::size_t start = 0; start < child_stderr.size();) {
     const std::size_t end = std::min(child_stderr.find('\n', start), child_stderr.size());
@@ -109,7 +109,7 @@ CLI::App* add_daemon_command(CLI::App& app, CommandContext& context, const std::
 
 int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal) {
   CommandContext context{terminal, default_socket(), false, {}};
-  CLI::App app("Paints pictures on three-dimensional objects with light: the operator's command.", "hilbrush");
+  CLI::App app("Paints pictures on three-dimensional objects with light.", "hilbrush");
   app.set_version_flag("--version", "hilbrush " HILBRUSH_VERSION);
   app.require_subcommand(1);
   app.footer(std::string("`hilbrush COMMAND --help` explains one command.\n") + kFooter);
@@ -122,7 +122,10 @@ int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal) 
     add_commissioning_commands(app, context);
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err), kExitOk;
+    if (error.get_exit_code() == 0) {  // help or version was asked for
+      app.exit(error, terminal.out, terminal.err);
+      return kExitOk;
+    }
     terminal.err << "hilbrush: " << printable(error.what()) << "\nTry hilbrush --help.\n";
     return kExitUsage;
   } catch (const std::exception& error) {

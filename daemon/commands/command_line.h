@@ -4,13 +4,16 @@
 
 #include "daemon/commands/terminal.h"
 
-/// The operator's command `hilbrush`, without its main(): parses, runs one command, reports errors as sentences.
-///   settings_flags (flags to settings), pipeline_commands + pipeline_run (what needs a mesh, in a child process),
-///   job_commands + cell_commands + rpc_client (what the daemon does), text_output + progress_display (what people
-///   read).
+/// The operator's command `hilbrush`, without its main(): parses the arguments, runs one command, reports errors as
+/// sentences.
+///   settings_flags                               flags to settings of a job
+///   pipeline_commands, quality_command, pipeline_run   work on a mesh, in a child process
+///   job_commands, cell_commands, watch, rpc_client     requests to the daemon
+///   check_command, commissioning_commands        files and devices, without a daemon
+///   text_output, progress_display                the output for people
 namespace hilbrush {
 
-/// `arguments` without the program's name. Returns an exit code, see exit_code.h. Never throws.
+/// `arguments`: without the name of the program. Returns an exit code, see exit_code.h. Never throws.
 int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal);
 
 }  // namespace hilbrush

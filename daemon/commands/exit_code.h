@@ -1,6 +1,6 @@
 #pragma once
 
-/// How `hilbrush` ends, for scripts. The same numbers as hilbrush-pipeline, which uses 0 to 3.
+/// The exit codes of `hilbrush`, for scripts. hilbrush-pipeline uses 0 to 3 with the same meaning.
 namespace hilbrush {
 
 enum ExitCode : int {
@@ -8,7 +8,7 @@ enum ExitCode : int {
   kExitInternal = 1,      ///< a fault of the program or of the machine
   kExitUsage = 2,         ///< unknown command or flag
   kExitBadInput = 3,      ///< model, settings, cell, program or job number
-  kExitNoDaemon = 4,      ///< none answers, or the connection was lost
+  kExitNoDaemon = 4,      ///< no daemon answers, or the connection was lost
   kExitRefused = 5,       ///< the daemon or the operator refused: wrong state, device fault, not permitted
   kExitJobFailed = 6,     ///< the job that was watched failed or was cancelled
   kExitInterrupted = 130  ///< Ctrl-C, as shells report it

@@ -1,9 +1,10 @@
 #pragma once
 
-/// Ctrl-C and SIGTERM as a descriptor, so that a command can put things in order before it ends.
+/// Ctrl-C and SIGTERM as a descriptor, so that a command can clean up before it ends.
 namespace hilbrush {
 
-/// While one lives, both signals only make descriptor() readable. Make it before any thread; one at a time.
+/// While such an object exists, both signals only make descriptor() readable. Create it before any thread is started;
+/// only one at a time.
 class InterruptWatch {
  public:
   InterruptWatch();
@@ -12,14 +13,14 @@ class InterruptWatch {
   InterruptWatch& operator=(const InterruptWatch&) = delete;
 
   int descriptor() const { return descriptor_; }
-  /// Whether one came since the last call.
+  /// Whether a signal has come since the last call.
   bool take();
 
  private:
   int descriptor_ = -1;
 };
 
-/// Thrown where an interrupt ends a command; the text says what became of the work.
+/// Thrown where an interrupt ends a command; the sentence says what has become of the work.
 struct Interrupted {
   const char* sentence;
 };

@@ -32,11 +32,12 @@ struct JobFlags {
   bool part_in_place = false;
   std::string in_doubt;
   std::string until = "done";
-  int copies = 1, position = 1;
+  int copies = 1;
+  int position = 1;
   bool is_queue = false;
 };
 
-/// The answer of every method that has one job as its result.
+/// Prints the answer of a method whose result is one job.
 int print_job(const CommandContext& context, const Json& result, bool in_full) {
   const Json& job = member(result, "job");
   if (context.is_json)
@@ -77,7 +78,7 @@ int move(const CommandContext& context, const JobFlags& flags) {
   return print_job(context, client.call("job.move", Json{{"id", flags.id}, {"position", flags.position}}), false);
 }
 
-/// Only a person can see whether the part is there: a flag, or a question on a terminal.
+/// Only the operator can see whether the part is there: a flag, or a question on a terminal.
 bool is_part_in_place(const CommandContext& context, const JobFlags& flags) {
   if (flags.part_in_place) return true;
   if (!context.terminal.in_is_terminal) return false;
@@ -89,25 +90,25 @@ bool is_part_in_place(const CommandContext& context, const JobFlags& flags) {
 
 int start(const CommandContext& context, const JobFlags& flags) {
   if (!is_part_in_place(context, flags)) {
-    context.terminal.err << "hilbrush: not started: say --part-in-place once the part is on the table\n";
+    context.terminal.err << "hilbrush: not started: give --part-in-place when the part is on the table\n";
     return kExitRefused;
   }
   RpcClient client(context.socket_path);
   return print_job(context, client.call("job.start", Json{{"id", flags.id}, {"part_in_place", true}}), false);
 }
 
-/// The part is asked after only when something has happened since it was last seen in its place.
+/// Asks about the part only if the daemon cannot be sure that it is still in place.
 int resume(const CommandContext& context, const JobFlags& flags) {
   Json params{{"id", flags.id}};
   if (!flags.in_doubt.empty()) params["in_doubt"] = flags.in_doubt;
   RpcClient client(context.socket_path);
   const Json job = member(client.call("job.get", params_of(flags)), "job");
-  const bool is_asked_after = member(job, "needs_part_in_place") == true;
-  if (is_asked_after && !is_part_in_place(context, flags)) {
-    context.terminal.err << "hilbrush: not resumed: say --part-in-place once the part is where it was\n";
+  const bool needs_confirmation = member(job, "needs_part_in_place") == true;
+  if (needs_confirmation && !is_part_in_place(context, flags)) {
+    context.terminal.err << "hilbrush: not resumed: give --part-in-place when the part is where it was\n";
     return kExitRefused;
   }
-  if (is_asked_after || flags.part_in_place) params["part_in_place"] = true;
+  if (needs_confirmation || flags.part_in_place) params["part_in_place"] = true;
   return print_job(context, client.call("job.resume", params), false);
 }
 
@@ -141,11 +142,11 @@ Declared declare_with_id(CLI::App& app, CommandContext& context, const char* nam
 
 void add_submit(CLI::App& app, CommandContext& context) {
   const Declared command =
-      declare(app, context, "submit", "hand a model to the daemon; it is planned at once and waits for start", submit);
+      declare(app, context, "submit", "send a model to the daemon, which plans it at once; start paints it", submit);
   command.app->add_option("MODEL", command.flags->model, "VRML, OBJ, PLY, OFF or STL file")->required();
-  command.app->add_flag("--dry-run", command.flags->dry_run, "paint on a simulated cell of its own; needs no start");
+  command.app->add_flag("--dry-run", command.flags->dry_run, "paint on a simulated cell of its own, without start");
   command.app->add_option("--key", command.flags->key, "submitting again with the same key finds the same job");
-  command.app->add_option("--copies", command.flags->copies, "paint so many parts, one after another")
+  command.app->add_option("--copies", command.flags->copies, "paint this many parts, one after another (default 1)")
       ->check(CLI::Range(1, 1000));
   command.flags->settings.add_to(*command.app);
 }
@@ -156,7 +157,7 @@ void add_watch(CLI::App& app, CommandContext& context) {
                       [](CommandContext& c, const JobFlags& flags) { return watch_job(c, flags.id, flags.until); });
   command.app
       ->add_option("--until", command.flags->until,
-                   "end already when this state is reached: planning, ready, painting, paused or done")
+                   "stop watching in this state: planning, ready, painting, paused or done (default)")
       ->check(CLI::IsMember({"planning", "ready", "painting", "paused", "done"}));
 }
 
@@ -165,28 +166,30 @@ void add_watch(CLI::App& app, CommandContext& context) {
 void add_job_commands(CLI::App& app, CommandContext& context) {
   add_submit(app, context);
   add_watch(app, context);
-  const Declared list_command = declare(app, context, "list", "all jobs in a table",
+  const Declared list_command = declare(app, context, "list", "show all jobs in a table",
                                         [](CommandContext& c, const JobFlags& f) { return list(c, f); });
-  list_command.app->add_flag("--queue", list_command.flags->is_queue, "only those that wait, in their order");
-  declare_with_id(app, context, "get", "everything about one job",
+  list_command.app->add_flag("--queue", list_command.flags->is_queue,
+                             "only the waiting jobs, in the order of the queue");
+  declare_with_id(app, context, "get", "show everything about one job",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.get", true); });
   const Declared start_command = declare_with_id(app, context, "start", "start painting a job that is ready", start);
   start_command.app->add_flag("--part-in-place", start_command.flags->part_in_place,
-                              "the part is on the table (else you are asked)");
+                              "confirms that the part is on the table (without it a terminal asks)");
   declare_with_id(app, context, "pause", "pause painting after the current dot",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.pause", false); });
-  const Declared resume_command = declare_with_id(app, context, "resume", "go on painting", resume);
+  const Declared resume_command = declare_with_id(app, context, "resume", "continue painting", resume);
   resume_command.app
-      ->add_option("--in-doubt", resume_command.flags->in_doubt, "dots that may have been exposed: leave or expose")
+      ->add_option("--in-doubt", resume_command.flags->in_doubt,
+                   "dots that may have been exposed already: leave or expose")
       ->check(CLI::IsMember({"leave", "expose"}));
   resume_command.app->add_flag("--part-in-place", resume_command.flags->part_in_place,
-                               "the part is where it was (else you are asked, if that is not certain)");
+                               "confirms that the part is where it was (without it a terminal asks if necessary)");
   const Declared move_command =
-      declare_with_id(app, context, "move", "give a waiting job another place in the queue", move);
-  move_command.app->add_option("POSITION", move_command.flags->position, "1: the next")
+      declare_with_id(app, context, "move", "move a waiting job to another position in the queue", move);
+  move_command.app->add_option("POSITION", move_command.flags->position, "1: the next to be painted")
       ->required()
       ->check(CLI::PositiveNumber);
-  declare_with_id(app, context, "cancel", "give a job up",
+  declare_with_id(app, context, "cancel", "cancel a job; its remaining dots are not painted",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.cancel", false); });
 }
 

@@ -78,7 +78,7 @@ int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
   const std::string beside = flags.program.empty() ? std::string() : settings_beside(flags.program);
   const JobSettings settings = job_settings_from_json(flags.settings.to_json(beside, "report.json"));
   const fs::path cell = find_cell(settings.cell);
-  load_cell(cell);  // refused here, at once, and not after the model was read
+  load_cell(cell);  // so that a bad cell file is refused before the model is read
   const std::vector<std::string> arguments = child_arguments(flags, settings, cell);
 
   std::string result;
@@ -112,7 +112,7 @@ DeclaredRun declare(CLI::App& app, CommandContext& context, const std::string& n
   auto flags = std::make_shared<PipelineFlags>();
   flags->command = name;
   CLI::App* command = add_command(app, context, name, description);
-  command->add_option("-o,--output", flags->output, "folder for the results; made if absent")->required();
+  command->add_option("-o,--output", flags->output, "folder for the results, made if absent")->required();
   command->callback(
       [&context, flags] { context.action = [&context, flags] { return run_pipeline(context, *flags); }; });
   return {command, flags};
@@ -127,24 +127,25 @@ void add_model(const DeclaredRun& declared) {
 
 void add_pipeline_commands(CLI::App& app, CommandContext& context) {
   add_model(declare(app, context, "dry-run",
-                    "plan a model, paint it on the simulated cell and show the pictures; needs no daemon"));
-  add_model(declare(app, context, "plan", "make dots and exposure program of a model, without painting"));
+                    "plan a model, paint it on the simulated cell and write pictures; needs no daemon"));
+  add_model(declare(app, context, "plan", "make the dots and the exposure program of a model, without painting"));
 
-  const DeclaredRun develop = declare(app, context, "develop", "develop the film from what a simulated cell recorded");
+  const DeclaredRun develop =
+      declare(app, context, "develop", "write the pictures of a job that a simulated cell has painted");
   add_model(develop);
   develop.app
       ->add_option("--program", develop.flags->program,
-                   "the program that was run; settings default to those of the report.json beside it")
+                   "the program that was painted; settings default to those in the report.json beside it")
       ->required();
-  develop.app->add_option("--emissions", develop.flags->emissions, "the record of what the laser did")->required();
+  develop.app->add_option("--emissions", develop.flags->emissions, "the cell's record of emissions")->required();
 
-  const DeclaredRun calibrate = declare(
-      app, context, "calibrate", "make a tone curve from a gray wedge: on the simulated cell, or painted and measured");
+  const DeclaredRun calibrate =
+      declare(app, context, "calibrate", "make a tone curve from a gray wedge, simulated or painted and measured");
   auto* measured = calibrate.app->add_option("--measured", calibrate.flags->measured,
-                                             "the wedge_steps.json of a painted wedge, with its readings filled in");
+                                             "the wedge_steps.json of a painted wedge, with the readings filled in");
   calibrate.app
       ->add_flag("--wedge", calibrate.flags->is_wedge,
-                 "write a wedge to paint instead: wedge.wrl, its job's wedge.json, and wedge_steps.json to fill in")
+                 "write a wedge to paint: wedge.wrl, its settings wedge.json, and wedge_steps.json to fill in")
       ->excludes(measured);
   calibrate.flags->settings.add_paint_flags_to(*calibrate.app);
 }

@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kLineBytesMax = 64u << 20;
 constexpr std::size_t kStderrBytesKept = 8192;
-constexpr auto kPatience = std::chrono::seconds(3);  ///< between asking a child to end and making it
+constexpr auto kTerminationTimeout = std::chrono::seconds(3);  ///< between SIGTERM and SIGKILL
 
 /// One end of a pipe, closed with its owner.
 class Descriptor {
@@ -63,7 +63,7 @@ struct Pipe {
   }
 };
 
-/// The running child. Its whole process group is ended with the object.
+/// A running child. The destructor kills its whole process group.
 class Child {
  public:
   Child(const std::string& program, const std::vector<std::string>& arguments, int out, int err) {
@@ -74,7 +74,7 @@ class Child {
     pid_ = fork();
     if (pid_ < 0) throw std::system_error(errno, std::generic_category(), "no child process can be made");
     if (pid_ == 0) become(program, argv.data(), out, err, parent);
-    setpgid(pid_, pid_);  // here as in the child: whoever is first
+    setpgid(pid_, pid_);  // in parent and child, so that it is done whichever runs first
   }
   ~Child() {
     if (status_) return;
@@ -86,9 +86,9 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  /// Its wait status; it has closed its outputs, so it ends at once or is made to.
-  int wait(std::chrono::steady_clock::duration patience) {
-    const auto deadline = std::chrono::steady_clock::now() + patience;
+  /// Returns the wait status; kills the child if it has not ended by then.
+  int wait(std::chrono::steady_clock::duration timeout) {
+    const auto deadline = std::chrono::steady_clock::now() + timeout;
     int status = 0;
     while (!status_) {
       const pid_t ended = waitpid(pid_, &status, WNOHANG);
@@ -103,11 +103,11 @@ class Child {
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
       }
     }
-    kill(-pid_, SIGKILL);  // what it may have left behind
+    kill(-pid_, SIGKILL);  // processes that the child may have left in its group
     return *status_;
   }
 
-  void ask_to_end() { kill(-pid_, SIGTERM); }
+  void terminate() { kill(-pid_, SIGTERM); }
 
  private:
   /// Between fork and exec: async-signal-safe calls only.
@@ -130,7 +130,7 @@ class Child {
   std::optional<int> status_;
 };
 
-/// Cuts what the child prints into lines and keeps its last word.
+/// Splits the child's output into lines, forwards progress and warnings, and keeps result and error.
 class Protocol {
  public:
   explicit Protocol(const PipelineRunListener& listener) : listener_(listener) {}
@@ -148,7 +148,7 @@ class Protocol {
  private:
   void take_line(const std::string& line) {
     const Json message = Json::parse(line, nullptr, false);
-    if (!message.is_object()) return;  // not ours; a library may print
+    if (!message.is_object()) return;  // printed by a library
     if (const auto stage = message.find("stage"); stage != message.end() && stage->is_string()) {
       const auto fraction = message.find("fraction");
       const double value = fraction != message.end() && fraction->is_number() ? fraction->get<double>() : 0;
@@ -175,8 +175,8 @@ void follow(Child& child, const Descriptor& out, const Descriptor& err, Interrup
     if (poll(entries.data(), entries.size(), -1) < 0 && errno != EINTR)
       throw std::system_error(errno, std::generic_category(), "the child cannot be followed");
     if (entries[2].revents != 0 && interrupts.take()) {
-      child.ask_to_end();
-      child.wait(kPatience);
+      child.terminate();
+      child.wait(kTerminationTimeout);
       throw Interrupted{
           "interrupted: hilbrush-pipeline was ended; files already written are left in the output folder"};
     }
@@ -185,7 +185,7 @@ void follow(Child& child, const Descriptor& out, const Descriptor& err, Interrup
       const ssize_t count = read(entries[i].fd, block.data(), block.size());
       if (count < 0 && errno == EINTR) continue;
       if (count <= 0) {
-        entries[i].fd = -1;  // poll passes over it
+        entries[i].fd = -1;  // poll() skips it
       } else if (i == 0) {
         protocol.take(block.data(), static_cast<std::size_t>(count));
       } else {
@@ -196,7 +196,7 @@ void follow(Child& child, const Descriptor& out, const Descriptor& err, Interrup
   }
 }
 
-std::string death_sentence(int signal) {
+std::string signal_sentence(int signal) {
   const char* name = strsignal(signal);
   const std::string by = " (signal " + std::to_string(signal) + ", " + (name != nullptr ? name : "unknown") + ")";
   if (signal == SIGKILL)
@@ -206,9 +206,9 @@ std::string death_sentence(int signal) {
   return "hilbrush-pipeline crashed" + by + "; this is a fault of the program, not of the model";
 }
 
-/// The result, or the reason why there is none.
+/// Returns the result. @throws PipelineFailure with the reason if there is none.
 std::string conclude(int status, const Protocol& protocol, const std::string& child_stderr) {
-  if (WIFSIGNALED(status)) throw PipelineFailure(kExitInternal, death_sentence(WTERMSIG(status)), {}, child_stderr);
+  if (WIFSIGNALED(status)) throw PipelineFailure(kExitInternal, signal_sentence(WTERMSIG(status)), {}, child_stderr);
   const int code = WEXITSTATUS(status);
   if (code == 127) throw PipelineFailure(kExitInternal, "hilbrush-pipeline cannot be started", {}, child_stderr);
   if (protocol.error && protocol.error->is_object()) {

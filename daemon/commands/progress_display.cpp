@@ -21,7 +21,7 @@ void ProgressDisplay::show(const std::string& phase, double fraction, const std:
   const int filled = static_cast<int>(std::floor(fraction * kBarWidth));
   std::string bar = "[" + std::string(static_cast<std::size_t>(filled), '#') +
                     std::string(static_cast<std::size_t>(kBarWidth - filled), '.') + "] " + printable(text);
-  // A bar that wraps could not be taken back.
+  // A bar that wraps could not be removed.
   bar.resize(std::min(bar.size(), static_cast<std::size_t>(std::max(20, terminal_.width - 1))));
   if (bar == drawn_) return;
   clear_bar();

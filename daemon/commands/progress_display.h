@@ -14,11 +14,11 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  /// In a pipe a line is printed when `phase` changes and, if `lines_every_tenth`, at every tenth of the way.
+  /// In a pipe a line is printed when `phase` changes and, if `lines_every_tenth`, at every tenth of it.
   void show(const std::string& phase, double fraction, const std::string& text, bool lines_every_tenth = false);
   /// A line of its own, above the bar.
   void print_above(const std::string& line);
-  /// Takes the bar away.
+  /// Removes the bar.
   void finish();
 
  private:
@@ -26,8 +26,8 @@ class ProgressDisplay {
 
   Terminal& terminal_;
   bool is_quiet_;
-  std::string drawn_;  ///< the bar on the screen
-  std::string phase_;  ///< in a pipe: of the last line
+  std::string drawn_;  ///< the bar as it is on the screen
+  std::string phase_;  ///< of the last line printed in a pipe
   int tenth_ = -1;
 };
 

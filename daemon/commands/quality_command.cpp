@@ -18,7 +18,7 @@
 #include "daemon/commands/progress_display.h"
 #include "daemon/commands/text_output.h"
 
-/// `hilbrush quality`: runs hilbrush-pipeline quality, which measures, and shows what it found.
+/// `hilbrush quality`: runs hilbrush-pipeline quality, which measures, and shows the figures.
 namespace hilbrush {
 namespace {
 
@@ -32,15 +32,15 @@ struct QualityFlags {
   std::optional<std::uint64_t> seed, shapes;
 };
 
-/// The settings that placed the dots: those of --settings, or of the report.json beside them.
+/// The settings that the dots were placed with: those of --settings, or of the report.json beside them.
 std::string settings_of(const QualityFlags& flags) {
   if (!flags.settings.empty()) return read_text_file(flags.settings, kReportBytesMax);
   const fs::path report = fs::path(flags.set).parent_path() / "report.json";
   std::error_code error;
   if (!fs::exists(report, error))
-    throw InputError(flags.set, "has no report.json beside it that says how the model was placed: give --settings");
+    throw InputError(flags.set, "has no report.json beside it with the settings of its job: give --settings");
   const std::string settings = settings_beside(flags.set);
-  if (settings.empty()) throw InputError(report.string(), "holds no settings: give --settings");
+  if (settings.empty()) throw InputError(report.string(), "has no settings: give --settings");
   return settings;
 }
 
@@ -91,7 +91,7 @@ std::string heading_text(std::string key) {
   return key;
 }
 
-/// Rows of figures, one column a count.
+/// Rows of figures, one column for each count.
 class FigureTable {
  public:
   explicit FigureTable(const Json& sizes) : sizes_(sizes) {}
@@ -191,26 +191,28 @@ void add_quality_command(CLI::App& app, CommandContext& context) {
       ->add_option(
           "SET", flags->set,
           "what to measure: plane, sphere, monkey_saddle, eight_surface, whitney_umbrella, super_ellipsoid, "
-          "super_ellipsoid_reparameterized or equal_area_sphere; or a model file, on which dots are placed; or "
-          "with --model the dots.ply of a dry run")
+          "super_ellipsoid_reparameterized or equal_area_sphere; or a model file, to place dots on; or with --model "
+          "the dots.ply of a dry run")
       ->required();
-  command->add_option("-o,--output", flags->output, "folder for quality.json and plots; made if absent")->required();
+  command->add_option("-o,--output", flags->output, "folder for quality.json and plots, made if absent")->required();
   command->add_option("--model", flags->model, "the model that the dots of SET were placed on");
   command->add_option("--settings", flags->settings,
-                      "JSON file with the settings of that job (default: those of the report.json beside SET)");
+                      "JSON file with the settings of that job (default: those in the report.json beside SET)");
   command->add_option("--sampler", flags->sampler,
                       "how dots are placed: centroid (default), jittered, even, random, halton, hammersley, sobol, "
                       "niederreiter; on models also blue");
   command->add_option("--curve", flags->curve, "hilbert (default) or peano2");
-  command->add_option("--area", flags->area, "of formulas: triangle, square or first_fundamental_form (default)");
+  command->add_option("--area", flags->area,
+                      "of surfaces by name: triangle, square or first_fundamental_form (default)");
   command->add_option("--density", flags->density,
-                      "constant (default); of formulas also u, u+v, mean_curvature, gaussian_curvature; of models also "
-                      "texture, mean_curvature, gaussian_curvature");
+                      "constant (default); on surfaces by name also u, u+v, mean_curvature, "
+                      "gaussian_curvature; on models also texture, mean_curvature, gaussian_curvature");
   command->add_option("--points", flags->points,
-                      "instead of a curve's dots, in the plane or on the sphere: random, jittered, halton, hammersley, "
-                      "sobol or niederreiter");
-  command->add_option("--count", flags->counts, "how many dots (default 10000); several, for slopes")->delimiter(',');
-  command->add_option("--seed", flags->seed, "of what is random (default 1)");
+                      "instead of dots along a curve, in the plane or on the sphere: random, jittered, halton, "
+                      "hammersley, sobol or niederreiter");
+  command->add_option("--count", flags->counts, "number of dots (default 10000); two or more give slopes")
+      ->delimiter(',');
+  command->add_option("--seed", flags->seed, "of the random numbers (default 1)");
   command->add_option("--shapes", flags->shapes, "test shapes of each kind (default 1000)");
   command->callback([&context, flags] { context.action = [&context, flags] { return run(context, *flags); }; });
 }

@@ -49,7 +49,7 @@ std::string text_of(const Json& object, const char* key) {
 
 [[noreturn]] void throw_refusal(const Json& error) {
   if (!error.is_object() || !error.contains("code") || !error["code"].is_number_integer())
-    throw ConnectionError("the daemon answered with an error that is no JSON-RPC error");
+    throw ConnectionError("the daemon answered with an error that is not a JSON-RPC error");
   const auto data = error.find("data");
   const std::string at = data != error.end() && data->is_object() ? text_of(*data, "at") : std::string();
   const std::string message = text_of(error, "message");
@@ -75,15 +75,17 @@ RpcClient::~RpcClient() {
 }
 
 void RpcClient::connect_tcp(Deadline deadline) {
-  const std::string place = path_.substr(std::strlen(kTcp));
-  const auto colon = place.rfind(':');
+  const std::string endpoint = path_.substr(std::strlen(kTcp));
+  const auto colon = endpoint.rfind(':');
   if (colon == std::string::npos) throw ConnectionError(path_ + ": expected tcp://HOST:PORT");
   const char* token = std::getenv("HILBRUSH_TOKEN");
   if (token == nullptr || *token == '\0')
-    throw ConnectionError(path_ + " wants a token: put it into the environment as HILBRUSH_TOKEN");
-  addrinfo hints{}, *found = nullptr;
+    throw ConnectionError(path_ + " needs a token: put it into the environment variable HILBRUSH_TOKEN");
+  addrinfo hints{};
+  addrinfo* found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
-  if (const int error = getaddrinfo(place.substr(0, colon).c_str(), place.substr(colon + 1).c_str(), &hints, &found))
+  if (const int error =
+          getaddrinfo(endpoint.substr(0, colon).c_str(), endpoint.substr(colon + 1).c_str(), &hints, &found))
     throw ConnectionError(path_ + ": " + gai_strerror(error));
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, &freeaddrinfo);
   int error = ECONNREFUSED;
@@ -118,7 +120,7 @@ void RpcClient::connect_until(Deadline deadline) {
   while (connect(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
     const int error = errno;
     if (error == EINTR) continue;
-    // EAGAIN: the daemon's queue of new connections is full; a Unix socket has no way to wait for it.
+    // EAGAIN: the daemon's queue of new connections is full; connect() on a Unix socket does not wait for it.
     if (error == EAGAIN && Clock::now() < deadline) {
       std::this_thread::sleep_for(Milliseconds(5));
       continue;
@@ -154,7 +156,8 @@ std::optional<std::string> RpcClient::read_line(Deadline deadline) {
       return line;
     }
     searched_ = buffer_.size();
-    if (buffer_.size() > kLineBytesMax) throw ConnectionError("the daemon's answer is longer than can be meant");
+    if (buffer_.size() > kLineBytesMax)
+      throw ConnectionError("the daemon's answer is longer than any answer should be");
 
     std::array<char, 65536> block;
     const ssize_t count = recv(descriptor_, block.data(), block.size(), 0);
@@ -195,7 +198,7 @@ Json RpcClient::call(const std::string& method, const Json& params, std::optiona
       keep(*message);
       continue;
     }
-    // A line that the daemon could not read as a request is answered without its id.
+    // The daemon answers without an id if it could not read the line as a request.
     const Json answered = message->value("id", Json());
     const bool has_error = message->contains("error");
     if (answered != id && !(answered.is_null() && has_error))

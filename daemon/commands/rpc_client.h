@@ -7,17 +7,16 @@
 #include <stdexcept>
 #include <string>
 
-/// The operator's end of the daemon's socket: JSON-RPC 2.0, one message a line, blocking, with a time limit on
-/// everything.
+/// The client's end of the daemon's socket: JSON-RPC 2.0, one message a line, blocking, with a timeout on everything.
 namespace hilbrush {
 
-/// No daemon, a lost or silent connection, or answers that are no JSON-RPC. The text is a sentence for the operator.
+/// No daemon, a lost or silent connection, or answers that are not JSON-RPC. what() is a sentence for the operator.
 class ConnectionError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The daemon understood and refused.
+/// The daemon refused a request.
 class RpcRefusal : public std::runtime_error {
  public:
   RpcRefusal(int code, const std::string& message, std::string at)
@@ -30,24 +29,24 @@ class RpcRefusal : public std::runtime_error {
   std::string at_;
 };
 
-/// One thread at a time.
+/// Used by one thread at a time.
 class RpcClient {
  public:
   using Milliseconds = std::chrono::milliseconds;
 
   static constexpr std::size_t kLineBytesMax = 64u << 20;
-  static constexpr std::size_t kNotificationsMax =
-      4096;  ///< kept while an answer is waited for; older ones are dropped
+  /// Kept while an answer is waited for; older ones are dropped.
+  static constexpr std::size_t kNotificationsMax = 4096;
 
-  /// Connects: to a Unix socket's path, or to "tcp://HOST:PORT", where the token in $HILBRUSH_TOKEN says who asks.
-  /// @throws ConnectionError, RpcRefusal (nobody's token)
+  /// Connects to the path of a Unix socket, or to "tcp://HOST:PORT" with the token in $HILBRUSH_TOKEN.
+  /// @throws ConnectionError, RpcRefusal (unknown token)
   explicit RpcClient(std::string socket_path, Milliseconds timeout = Milliseconds(10000));
   ~RpcClient();
   RpcClient(const RpcClient&) = delete;
   RpcClient& operator=(const RpcClient&) = delete;
 
   /// Sends a request and returns its result. Notifications that come in between are kept.
-  /// @throws RpcRefusal, ConnectionError (also if there is no answer in time: the connection is of no use then).
+  /// @throws RpcRefusal, ConnectionError (also if there is no answer in time; the connection cannot be used after that)
   nlohmann::ordered_json call(const std::string& method, const nlohmann::ordered_json& params,
                               std::optional<Milliseconds> timeout = {});
 
@@ -58,7 +57,7 @@ class RpcClient {
   /// The next notification, or nothing if none comes in time. @throws ConnectionError
   std::optional<Notification> next_notification(Milliseconds timeout);
 
-  /// For poll() beside other things. Readable means that next_notification() has something to do.
+  /// For poll(). When it is readable, call next_notification().
   int descriptor() const { return descriptor_; }
 
  private:
@@ -75,8 +74,8 @@ class RpcClient {
   Milliseconds timeout_;
   int descriptor_ = -1;
   long next_id_ = 1;
-  std::string buffer_;        ///< received, not yet taken as lines
-  std::size_t searched_ = 0;  ///< of buffer_, without a line end
+  std::string buffer_;        ///< received bytes that are not yet a whole line
+  std::size_t searched_ = 0;  ///< bytes of buffer_ known to have no line end
   std::deque<Notification> notifications_;
 };
 

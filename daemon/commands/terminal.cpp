@@ -6,7 +6,7 @@ namespace hilbrush {
 
 std::string printable(const std::string& text) {
   std::string clean = text;
-  // Bytes from 0x80 on are parts of UTF-8 characters; its own control characters are C2 80 to C2 9F.
+  // Bytes from 0x80 on are parts of UTF-8 characters; the control characters among those are C2 80 to C2 9F.
   for (std::size_t i = 0; i < clean.size(); ++i) {
     const auto byte = static_cast<unsigned char>(clean[i]);
     const auto next = static_cast<unsigned char>(i + 1 < clean.size() ? clean[i + 1] : 0);

@@ -2,7 +2,7 @@
 #include <iosfwd>
 #include <string>
 
-/// Where a command talks to: standard output, error and input, or a test's streams.
+/// Input and output of a command: the standard streams, or those of a test.
 namespace hilbrush {
 
 struct Terminal {
@@ -14,8 +14,8 @@ struct Terminal {
   int width = 80;                ///< columns
 };
 
-/// The text without what could steer a terminal: control characters become spaces. For text that comes from files and
-/// sockets.
+/// The text with control characters replaced by spaces, so that it cannot control the terminal. For text that comes
+/// from files and sockets.
 std::string printable(const std::string& text);
 
 }  // namespace hilbrush

@@ -65,7 +65,8 @@ std::string skipped_text(const Json& skipped) {
 }
 
 std::string dots_text(const Json& dots) {
-  const double placed = number_field(dots, "placed"), exposed = number_field(dots, "exposed");
+  const double placed = number_field(dots, "placed");
+  const double exposed = number_field(dots, "exposed");
   std::string text = format_count(placed) + " placed, " + format_count(exposed) + " exposed";
   if (placed > 0) text += " (" + fixed(std::floor(1e4 * exposed / placed) / 100, 2) + " %)";
   text += ", " + skipped_text(member(dots, "skipped"));
@@ -95,7 +96,8 @@ std::string repairs_text(const Json& repairs) {
 }
 
 std::string time_text(const Json& time) {
-  std::string text = format_duration(number_field(time, "total")), parts;
+  std::string text = format_duration(number_field(time, "total"));
+  std::string parts;
   for (const char* part : {"move", "settle", "expose", "retract"})
     if (has_number(time, part))
       parts += (parts.empty() ? "" : ", ") + std::string(part) + " " + format_duration(number_field(time, part));
@@ -233,7 +235,8 @@ std::string format_report(const Json& report) {
 }
 
 std::string format_tone_curve(const Json& curve) {
-  const Json &wanted = member(curve, "wanted"), &asked = member(curve, "asked");
+  const Json& wanted = member(curve, "wanted");
+  const Json& asked = member(curve, "asked");
   std::string text;
   if (!wanted.is_array() || !asked.is_array()) return format_fields(curve);
   if (const std::string sampler = text_field(curve, "sampler"); !sampler.empty()) text += line("sampler", sampler);
@@ -246,7 +249,8 @@ std::string format_tone_curve(const Json& curve) {
 
 std::string format_job_line(const Json& job) {
   const Json& dots = member(job, "dots");
-  const std::string state = text_field(job, "state", "?"), stage = text_field(job, "stage");
+  const std::string state = text_field(job, "state", "?");
+  const std::string stage = text_field(job, "stage");
   std::string text = "job " + id_text(job) + ": " + state;
   if (state == "planning") return text + (stage.empty() ? "" : ", " + stage) + " " + percent_text(job);
   if (const double placed = number_field(dots, "placed"); placed > 0)
@@ -259,7 +263,8 @@ std::string format_job_line(const Json& job) {
 std::string format_job_error(const Json& job) {
   const Json& error = member(job, "error");
   if (!error.is_object()) return error.is_null() ? std::string() : value_text(error);
-  const std::string at = text_field(error, "at"), message = text_field(error, "message");
+  const std::string at = text_field(error, "at");
+  const std::string message = text_field(error, "message");
   return at.empty() ? message : at + ": " + message;
 }
 

@@ -2,9 +2,9 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-/// Answers of the daemon and reports of the pipeline as text for people. Fields may be missing or of another type (a
-/// newer or older program answers): what is not understood is left out, never a failure. No text contains control
-/// characters but line ends.
+/// Answers of the daemon and reports of the pipeline as text for people. Fields may be missing or of another type, if
+/// the other program is newer or older: they are left out and cause no failure. The only control characters in a text
+/// are line ends.
 namespace hilbrush {
 
 /// 3725.4 -> "1:02:05".
@@ -12,7 +12,7 @@ std::string format_duration(double seconds);
 /// 1234567 -> "1,234,567".
 std::string format_count(double count);
 
-/// What a dry run, plan or develop found: dots, incidence, time, fidelity, repairs, warnings. Several lines.
+/// The report of a dry run, plan or develop: dots, incidence, time, fidelity, repairs, warnings. Several lines.
 std::string format_report(const nlohmann::ordered_json& report);
 /// A tone curve as a table of wanted and asked coverage.
 std::string format_tone_curve(const nlohmann::ordered_json& curve);

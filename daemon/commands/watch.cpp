@@ -18,8 +18,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Whether a job in `state` is at `until` or past it. A job may be paused any number of times: that is never "past" for
-/// painting.
+/// Whether a job in `state` has reached `until` or passed it. Painting and paused may alternate any number of times, so
+/// neither is past the other.
 bool is_reached(const std::string& state, const std::string& until) {
   const auto rank = [](const std::string& s) {
     if (s == "queued") return 0;
@@ -27,7 +27,7 @@ bool is_reached(const std::string& state, const std::string& until) {
     if (s == "ready") return 2;
     if (s == "painting" || s == "paused") return 3;
     if (s == "done") return 4;
-    return s == "failed" || s == "cancelled" ? 5 : -1;  // the end, whatever was waited for
+    return s == "failed" || s == "cancelled" ? 5 : -1;  // these end every wait
   };
   return state == until || rank(state) > rank(until);
 }
@@ -36,14 +36,14 @@ bool is_failed(const std::string& state) {
   return state == "failed" || state == "cancelled";
 }
 
-/// Blocks until the daemon says something or the operator interrupts.
+/// Blocks until an update of the job or an interrupt.
 Json next_update(RpcClient& client, InterruptWatch& interrupts) {
   while (true) {
     while (const auto notification = client.next_notification(RpcClient::Milliseconds(0)))
       if (notification->method == "job.update") return notification->params;
     std::array<pollfd, 2> entries{{{client.descriptor(), POLLIN, 0}, {interrupts.descriptor(), POLLIN, 0}}};
     if (poll(entries.data(), entries.size(), -1) < 0 && errno != EINTR)
-      throw ConnectionError("the connection cannot be waited for");
+      throw ConnectionError("waiting for the daemon failed");
     if (interrupts.take()) throw Interrupted{"no longer watching; the job goes on"};
   }
 }
@@ -64,7 +64,7 @@ int watch_job(CommandContext& context, const std::string& id, const std::string&
       if (context.is_json) context.terminal.out << update.dump() << std::endl;
       std::string phase = state;
       if (state == "planning") phase.append(", ").append(text_field(job, "stage", "waiting"));
-      // In a pipe a stage's line is printed when it begins: its share done would say nothing.
+      // In a pipe the line of a stage is printed when the stage begins, so its percentage would always be near 0.
       const bool is_begin = state == "planning" && !context.terminal.out_is_terminal;
       std::string line = "job ";
       line.append(id).append(": ").append(phase);

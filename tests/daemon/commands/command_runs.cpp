@@ -48,7 +48,7 @@ FakeDaemon::FakeDaemon(std::function<void(Peer&)> script) {
     throw std::runtime_error("the fake daemon cannot listen");
   thread_ = std::thread([this, run = std::move(script)] {
     const int connection = accept(listener_, nullptr, nullptr);
-    if (connection < 0) return;  // nobody came
+    if (connection < 0) return;  // finish() woke accept()
     Peer peer(connection);
     run(peer);
     close(connection);

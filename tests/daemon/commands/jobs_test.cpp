@@ -113,7 +113,7 @@ TEST(JobCommands, StartAsksOnATerminalAndRefusesInAPipe) {
     AnsweringDaemon daemon(kJob);
     const CommandRun run = run_with(daemon, {"start", "7"});
     EXPECT_EQ(run.exit_code, kExitRefused);
-    EXPECT_EQ(run.err, "hilbrush: not started: say --part-in-place once the part is on the table\n");
+    EXPECT_EQ(run.err, "hilbrush: not started: give --part-in-place when the part is on the table\n");
     EXPECT_TRUE(daemon.requests().empty());
   }
   for (const char* no : {"n\n", "\n", "", "yeah\n"}) {

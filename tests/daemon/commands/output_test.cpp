@@ -56,7 +56,7 @@ TEST(TextOutput, ReportSaysWhatAPersonNeeds) {
       "  warning:       texture a.png is missing\n");
 }
 
-TEST(TextOutput, SkippedDotsAreToldWithAmountsAndWhatWouldHelp) {
+TEST(TextOutput, SkippedDotsHaveAmountsAndASuggestion) {
   Json report = kReport;
   report["skipped"] =
       Json::parse(R"([{"reason":"incidence","count":1234,"text":"tilt past its limit, typically by 2.1"},

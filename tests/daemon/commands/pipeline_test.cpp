@@ -47,7 +47,8 @@ constexpr const char* kResult =
     R"(echo '{"result":{"mesh":{"file":"cup.wrl"},"dots":{"placed":10,"exposed":9,"skipped":{"occluded":1}},"time_s":{"total":75}}}')";
 
 TEST_F(PipelineCommands, DryRunShowsStagesWarningsReportAndFiles) {
-  use_child(std::string(R"(echo '{"stage":"load","fraction":0.5}'; echo 'not ours'; echo '{"stage":"load","fraction":1}'
+  use_child(
+      std::string(R"(echo '{"stage":"load","fraction":0.5}'; echo 'of a library'; echo '{"stage":"load","fraction":1}'
 echo '{"warning":"texture a.png is missing"}'; echo '{"stage":"plan","fraction":0.25}'
 mkdir -p "$folder/out/views"; echo '{}' > "$folder/out/report.json"; echo > "$folder/out/exposure.png"
 )") + kResult);
@@ -177,7 +178,7 @@ TEST_F(PipelineCommands, TheChildsErrorsKeepPlaceSentenceAndExitCode) {
   EXPECT_EQ(run.out, "{\"error\":{\"code\":3,\"message\":\"no geometry\",\"at\":\"cup.wrl:12\"}}\n");
 }
 
-TEST_F(PipelineCommands, AChildThatDiesIsToldInASentence) {
+TEST_F(PipelineCommands, AChildThatDiesIsReportedInASentence) {
   struct Case {
     const char *script, *error;
   };
@@ -242,8 +243,8 @@ TEST_F(PipelineCommands, InterruptEndsTheChildAndAllItStarted) {
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   EXPECT_EQ(run.exit_code, kExitInterrupted);
   EXPECT_TRUE(run.err.starts_with("hilbrush: interrupted: hilbrush-pipeline was ended")) << run.err;
-  EXPECT_NE(kill(std::stoi(read("pid")), 0), 0);  // gone, and buried
-  // Orphans die and are buried by init in their own time: gone, or a zombie.
+  EXPECT_NE(kill(std::stoi(read("pid")), 0), 0);  // gone, and reaped
+  // Orphans are reaped by init at some later time: gone, or a zombie.
   const std::string orphan = "/proc/" + std::to_string(std::stoi(read("grandchild"))) + "/stat";
   const auto is_alive = [&] {
     std::ifstream status(orphan);

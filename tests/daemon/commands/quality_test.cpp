@@ -53,11 +53,12 @@ TEST_F(QualityCommand, AModelIsNamedByItsWholePath) {
 
 TEST_F(QualityCommand, DotsTakeTheSettingsBesideThem) {
   use_child(kEmptyResult);
-  const std::string model = folder_.write("cup.wrl", "#VRML V2.0 utf8\n"), dots = folder_.write("dots.ply", "ply\n");
+  const std::string model = folder_.write("cup.wrl", "#VRML V2.0 utf8\n");
+  const std::string dots = folder_.write("dots.ply", "ply\n");
   CommandRun run = run_command({"quality", dots, "--model", model, "-o", path("out")});
   EXPECT_EQ(run.exit_code, kExitBadInput);
-  EXPECT_EQ(run.err, "hilbrush: " + dots +
-                         ": has no report.json beside it that says how the model was placed: give --settings\n");
+  EXPECT_EQ(run.err,
+            "hilbrush: " + dots + ": has no report.json beside it with the settings of its job: give --settings\n");
   EXPECT_FALSE(child_ran());
 
   folder_.write("report.json", R"({"settings":{"size_mm":60},"dots":{}})");
@@ -72,7 +73,7 @@ TEST_F(QualityCommand, DotsTakeTheSettingsBesideThem) {
 
   folder_.write("report.json", "{}");
   run = run_command({"quality", dots, "--model", model, "-o", path("out")});
-  EXPECT_EQ(run.err, "hilbrush: " + path("report.json") + ": holds no settings: give --settings\n");
+  EXPECT_EQ(run.err, "hilbrush: " + path("report.json") + ": has no settings: give --settings\n");
 }
 
 TEST_F(QualityCommand, FilesThatAreNotThereAreRefusedAtOnce) {
@@ -88,7 +89,7 @@ TEST_F(QualityCommand, FilesThatAreNotThereAreRefusedAtOnce) {
   EXPECT_FALSE(child_ran());
 }
 
-TEST_F(QualityCommand, TheChildsPathsAreToldAsFlags) {
+TEST_F(QualityCommand, PathsInErrorsOfTheChildBecomeFlags) {
   use_child(R"(echo '{"error":{"at":"$.area","message":"expected \"triangle\", found \"x\""}}'; exit 3)");
   CommandRun run = run_command({"quality", "sphere", "-o", path("out"), "--area", "x"});
   EXPECT_EQ(run.exit_code, kExitBadInput);

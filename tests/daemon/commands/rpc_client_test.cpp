@@ -135,7 +135,7 @@ TEST(RpcClient, HalfAMessageAndThenSilenceEndsToo) {
 }
 
 TEST(RpcClient, ADaemonThatDoesNotListenIsNotWaitedForForever) {
-  // The request is larger than the socket's buffers, and nobody reads.
+  // The request is larger than the socket's buffers, and the other end does not read.
   std::promise<void> done;
   FakeDaemon daemon([&](Peer&) { done.get_future().wait(); });
   RpcClient client(daemon.socket_path(), Milliseconds(100));
@@ -157,7 +157,7 @@ TEST(RpcClient, AnswersThatAreNoJsonRpcAreRefused) {
   EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":2,"result":1})"), "the daemon answered a request that was not made");
   EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":1})"), "the daemon's answer has neither result nor error");
   EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":1,"error":"bad"})"),
-            "the daemon answered with an error that is no JSON-RPC error");
+            "the daemon answered with an error that is not a JSON-RPC error");
 }
 
 TEST(RpcClient, KeepsABoundedNumberOfNotifications) {
