@@ -1,5 +1,5 @@
-// hilbrush-pipeline: everything that needs a mesh, as a child of `hilbrush` and `hilbrushd`.
-// It talks JSON lines on standard output:
+// hilbrush-pipeline: all work on a mesh, as a child process of `hilbrush` and `hilbrushd`.
+// It prints JSON lines on standard output:
 //   {"stage":"plan","fraction":0.4}   {"warning":"..."}   and last   {"result":{...}}   or
 //   {"error":{"at":"cup.wrl:12","message":"..."}}
 // Exit codes: 0 ok, 1 internal failure, 2 wrong usage, 3 bad input.
@@ -23,11 +23,11 @@ using namespace hilbrush;
 
 enum ExitCode { kOk = 0, kInternal = 1, kUsage = 2, kBadInput = 3 };
 
-void say(const Json& line) {
+void print_line(const Json& line) {
   std::cout << line.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
 }
 
-/// Every change of stage, and within a stage ten lines a second at most.
+/// Prints every change of stage, and within a stage at most ten lines a second.
 class ProgressLines {
  public:
   void operator()(const char* stage, double fraction) {
@@ -35,7 +35,7 @@ class ProgressLines {
     if (stage_ == stage && now - last_ < std::chrono::milliseconds(100)) return;
     stage_ = stage;
     last_ = now;
-    say({{"stage", stage}, {"fraction", fraction}});
+    print_line({{"stage", stage}, {"fraction", fraction}});
   }
 
  private:
@@ -44,7 +44,8 @@ class ProgressLines {
 };
 
 struct Arguments {
-  std::string model, settings_json = "{}", cell, output, program, emissions, measured;
+  std::string model, cell, output, program, emissions, measured;
+  std::string settings_json = "{}";
   std::string request_json;
   bool wedge = false;
   std::vector<double> from;
@@ -86,14 +87,14 @@ int run_and_answer(const std::string& command, const Arguments& arguments) {
   ProgressLines progress;
   const PipelineListener listener{[&progress](const char* stage, double fraction) { progress(stage, fraction); },
                                   [](const std::string& sentence) {
-                                    say({{"warning", sentence}});
+                                    print_line({{"warning", sentence}});
                                   }};
   const auto fail = [](const std::string& at, const std::string& message, ExitCode code) {
-    say({{"error", {{"at", at}, {"message", message}}}});
+    print_line({{"error", {{"at", at}, {"message", message}}}});
     return code;
   };
   try {
-    say({{"result", run(command, arguments, listener)}});
+    print_line({{"result", run(command, arguments, listener)}});
     return kOk;
   } catch (const InputError& error) {
     return fail(error.at(), error.sentence(), kBadInput);
@@ -106,6 +107,38 @@ int run_and_answer(const std::string& command, const Arguments& arguments) {
   }
 }
 
+void add_commands(CLI::App& app, Arguments& arguments) {
+  const auto add = [&](const char* name, const char* what, bool has_model, bool has_output) {
+    CLI::App* command = app.add_subcommand(name, what);
+    if (has_model) command->add_option("--model", arguments.model, "model file")->required();
+    if (std::string(name) != "files" && std::string(name) != "quality") {
+      command->add_option("--settings-json", arguments.settings_json, "job settings, a JSON object");
+      command->add_option("--cell", arguments.cell, "cell file or name (default: the settings' cell)");
+    }
+    if (has_output) command->add_option("--output", arguments.output, "folder for all files written")->required();
+    return command;
+  };
+  add("files", "list all files that the model is read from", true, false);
+  add("plan", "write program.ply, dots.ply and report.json", true, true);
+  add("dry-run", "plan, paint on the simulated cell, develop", true, true);
+  CLI::App* develop = add("develop", "develop the film from the emissions that a simulated cell recorded", true, true);
+  develop->add_option("--program", arguments.program, "program file")->required();
+  develop->add_option("--emissions", arguments.emissions, "the cell's record of emissions")->required();
+  CLI::App* calibrate = add("calibrate", "make a tone curve from a gray wedge", false, true);
+  auto* measured = calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
+  calibrate->add_flag("--wedge", arguments.wedge, "write a wedge to paint and measure")->excludes(measured);
+  add("quality", "measure how evenly dots lie", false, true)
+      ->add_option("--request-json", arguments.request_json, "what to measure, a JSON object")
+      ->required();
+  CLI::App* approach = add("approach", "plan the path from measured joints to an exposure", true, false);
+  approach->add_option("--program", arguments.program, "program file")->required();
+  approach->add_option("--next", arguments.next, "index of the exposure to reach")->required();
+  approach->add_option("--from", arguments.from, "j1,j2,j3,j4,a,c in rad and m")
+      ->required()
+      ->delimiter(',')
+      ->expected(static_cast<int>(kAxisCount));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -115,37 +148,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("hilbrush-pipeline ") + HILBRUSH_VERSION);
   app.require_subcommand(1);
   Arguments arguments;
-
-  const auto add = [&](const char* name, const char* what, bool has_model, bool has_output) {
-    CLI::App* command = app.add_subcommand(name, what);
-    if (has_model) command->add_option("--model", arguments.model, "model file")->required();
-    if (std::string(name) != "files" && std::string(name) != "quality") {
-      command->add_option("--settings-json", arguments.settings_json, "job settings, a JSON object");
-      command->add_option("--cell", arguments.cell, "cell file or name (default: the settings' cell)");
-    }
-    if (has_output) command->add_option("--output", arguments.output, "folder for everything written")->required();
-    return command;
-  };
-  add("files", "list every file that reading the model reads", true, false);
-  add("plan", "write program.ply, dots.ply and report.json", true, true);
-  add("dry-run", "plan, paint on the simulated cell, develop", true, true);
-  CLI::App* develop = add("develop", "develop what a simulated cell recorded", true, true);
-  develop->add_option("--program", arguments.program, "program file")->required();
-  develop->add_option("--emissions", arguments.emissions, "the cell's record of emissions")->required();
-  CLI::App* calibrate = add("calibrate", "make a tone curve from a gray wedge", false, true);
-  auto* measured = calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
-  calibrate->add_flag("--wedge", arguments.wedge, "write a wedge to paint and measure")->excludes(measured);
-  add("quality", "measure how evenly dots lie", false, true)
-      ->add_option("--request-json", arguments.request_json, "what to measure, a JSON object")
-      ->required();
-  CLI::App* approach = add("approach", "plan the way from measured joints to an exposure", true, false);
-  approach->add_option("--program", arguments.program, "program file")->required();
-  approach->add_option("--next", arguments.next, "index of the exposure to reach")->required();
-  approach->add_option("--from", arguments.from, "j1,j2,j3,j4,a,c in rad and m")
-      ->required()
-      ->delimiter(',')
-      ->expected(kAxisCount);
-
+  add_commands(app, arguments);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,12 +1,14 @@
-// hilbrush-simcell: a simulated robot cell behind the wires of real devices: TCP ports and pseudo-terminals, with
-// faults by script. See sim/wire/wire_cell.h.
+// hilbrush-simcell: a simulated robot cell that speaks the protocols of real devices, on TCP ports and
+// pseudo-terminals, with faults by script. See sim/wire/wire_cell.h.
 
+#include <fmt/core.h>
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <fstream>
+#include <map>
 #include <memory>
 
 #include "config/cell_file.h"
@@ -25,7 +27,8 @@ using hilbrush::WireOptions;
 enum ExitCode { kOk = 0, kInternal = 1, kUsage = 2, kBadInput = 3 };
 
 struct Arguments {
-  std::string cell = "default", write_cell, faults, record;
+  std::string cell = "default";
+  std::string write_cell, faults, record;
   WireOptions wire;
 };
 
@@ -34,7 +37,7 @@ void write_file(const std::string& file, const std::string& text) {
   if (!(out << text).flush()) throw std::runtime_error(file + ": cannot be written");
 }
 
-/// Before any thread begins, so that all of them leave these signals to sigwait().
+/// Call before any thread is started, so that all threads leave these signals to sigwait().
 sigset_t block_ending_signals() {
   sigset_t signals;
   ::sigemptyset(&signals);
@@ -51,7 +54,7 @@ void serve(Arguments arguments) {
   const auto description = hilbrush::cell_from_json(cell_text, cell_file.string());
   if (!arguments.faults.empty()) arguments.wire.faults = hilbrush::load_fault_script(arguments.faults);
 
-  std::unique_ptr<hilbrush::EmissionRecordFile> record;  // outlives the cell, which may end a pulse at its end
+  std::unique_ptr<hilbrush::EmissionRecordFile> record;  // outlives the cell, whose destructor may end a pulse
   if (!arguments.record.empty()) record = std::make_unique<hilbrush::EmissionRecordFile>(arguments.record);
   WireCell cell(description, arguments.wire);
   if (record) cell.set_emission_sink([&](const hilbrush::Emission& emission) { record->append(emission); });
@@ -59,35 +62,29 @@ void serve(Arguments arguments) {
     write_file(arguments.write_cell, hilbrush::wired_cell_text(cell_text, cell.endpoints(), arguments.wire.time_scale));
 
   const auto& ends = cell.endpoints();
-  std::printf(
-      "{\"ready\":true,\"robot\":{\"dashboard_port\":%u,\"motion_port\":%u,\"feedback_port\":%u},\"table\":\"%s\","
-      "\"laser\":\"%s\"}\n",
+  fmt::print(
+      "{{\"ready\":true,\"robot\":{{\"dashboard_port\":{},\"motion_port\":{},\"feedback_port\":{}}},\"table\":\"{}\","
+      "\"laser\":\"{}\"}}\n",
       ends.dashboard_port, ends.motion_port, ends.feedback_port,
-      ends.table_serial.empty() ? std::to_string(ends.table_tcp_port).c_str() : ends.table_serial.c_str(),
-      ends.laser_port.c_str());
+      ends.table_serial.empty() ? std::to_string(ends.table_tcp_port) : ends.table_serial, ends.laser_port);
   std::fflush(stdout);
   int number = 0;
   ::sigwait(&ending, &number);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  CLI::App app{"A simulated robot cell that serves the protocols of its devices on TCP ports and pseudo-terminals."};
-  app.set_version_flag("--version", std::string("hilbrush-simcell ") + HILBRUSH_VERSION);
-  Arguments arguments;
+void add_flags(CLI::App& app, Arguments& arguments) {
   WireOptions& wire = arguments.wire;
   using Table = WireOptions::Table;
   using LaserHead = WireOptions::LaserHead;
   const std::map<std::string, Table> tables{
       {"oriental-az", Table::kOrientalAz}, {"cia402", Table::kCia402}, {"leadshine-pr", Table::kLeadshinePr}};
   const std::map<std::string, LaserHead> lasers{{"obis", LaserHead::kObis}, {"cobolt", LaserHead::kCobolt}};
-  app.add_option("--cell", arguments.cell, "cell file, or name of a shipped cell")->capture_default_str();
+  app.add_option("--cell", arguments.cell, "name of a cell, or its file")->capture_default_str();
   app.add_option("--write-cell", arguments.write_cell,
-                 "where to write that cell file with its devices replaced by drivers for this simulated cell");
+                 "write the cell file here, with its devices replaced by drivers for this simulated cell");
   app.add_option("--faults", arguments.faults, "fault script (JSON)");
-  app.add_option("--record", arguments.record, "file that every emission is appended to");
-  app.add_option("--time-scale", wire.time_scale, "wall seconds of one second of the cell")
+  app.add_option("--record", arguments.record, "append every emission to this file");
+  app.add_option("--time-scale", wire.time_scale, "wall seconds for one second of the cell")
       ->check(CLI::Range(1e-4, 1000.))
       ->capture_default_str();
   app.add_option("--table", wire.table, "oriental-az, cia402 or leadshine-pr")
@@ -95,12 +92,26 @@ int main(int argc, char** argv) {
   app.add_flag("--table-serial", wire.is_table_serial, "Modbus RTU on a pseudo-terminal instead of Modbus TCP");
   app.add_option("--laser", wire.laser, "obis or cobolt")->transform(CLI::CheckedTransformer(lasers, CLI::ignore_case));
   app.add_flag("--laser-serial", wire.is_laser_serial, "a pseudo-terminal instead of a TCP port");
-  app.add_option("--start-delay-s", wire.start_delay_s, "from the laser's being enabled to its light")
+  app.add_option("--start-delay-s", wire.start_delay_s, "seconds from enabling the laser to its emission")
       ->check(CLI::Range(0., 600.))
       ->capture_default_str();
-  app.add_option("--warm-up-s", wire.warm_up_s, "of the laser, from the start")
+  app.add_option("--warm-up-s", wire.warm_up_s, "seconds of the laser's warm-up, from the start")
       ->check(CLI::Range(0., 3600.))
       ->capture_default_str();
+}
+
+int report_failure(const std::exception& error, ExitCode code) {
+  fmt::print(stderr, "hilbrush-simcell: {}\n", error.what());
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"A simulated robot cell that speaks the protocols of its devices on TCP ports and pseudo-terminals."};
+  app.set_version_flag("--version", std::string("hilbrush-simcell ") + HILBRUSH_VERSION);
+  Arguments arguments;
+  add_flags(app, arguments);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -110,10 +121,8 @@ int main(int argc, char** argv) {
     serve(arguments);
     return kOk;
   } catch (const hilbrush::InputError& error) {
-    std::fprintf(stderr, "hilbrush-simcell: %s\n", error.what());
-    return kBadInput;
+    return report_failure(error, kBadInput);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "hilbrush-simcell: %s\n", error.what());
-    return kInternal;
+    return report_failure(error, kInternal);
   }
 }
