@@ -120,7 +120,7 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
        "\"niederreiter\", \"blue\" or \"fine\", found \"green\""},
       {R"({"curve":"moore"})", "$.curve: expected \"hilbert\", \"peano2\" or \"laminar\", found \"moore\""},
       {R"({"curve":"laminar","sampler":"even"})",
-       "$.sampler: laminar slices place their dots in one way only: leave sampler out"},
+       "$.sampler: laminar slices have only one way to place dots: leave sampler out"},
       {R"({"curve":"laminar","largest_gap_pitches":1})",
        "$.largest_gap_pitches: laminar slices have no strata to fill"},
       {R"({"dots":9,"largest_gap_pitches":1})",

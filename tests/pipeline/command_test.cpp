@@ -81,7 +81,8 @@ TEST(Command, BadInputIsThreeAndSaysWhere) {
   std::ofstream(folder.path() / "empty.obj");
   std::ofstream(folder.path() / "a_file") << "no folder";
   const std::string out = " -o " + quoted((folder.path() / "out").string());
-  const std::string broken = (folder.path() / "broken.wrl").string(), empty = (folder.path() / "empty.obj").string();
+  const std::string broken = (folder.path() / "broken.wrl").string();
+  const std::string empty = (folder.path() / "empty.obj").string();
   struct Case {
     std::string arguments, named;
   };

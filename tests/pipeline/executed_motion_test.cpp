@@ -46,7 +46,7 @@ TEST(ExecutedMotion, KeepsLimitsAndClearanceOnEveryTick) {
   EXPECT_GT(witness.ticks(), 10 * program.exposures.size());
 }
 
-/// The witness itself: it sees an axis that is too fast for the limits it was told.
+/// The witness itself: it sees an axis that is too fast for the limits that it has.
 TEST(ExecutedMotion, TheWitnessSeesWhatBreaksALimit) {
   CellDescription description = load_cell(find_cell("default"));
   description.simulation.time_scale = 0;

@@ -9,7 +9,7 @@
 #include "tests/pipeline/painting.h"
 
 /// A letter on each face of a cube, read back from the film: a picture that is turned, mirrored, or on the wrong face
-/// can't pass. What the test knows is the cube as tests/data/make_cubes.py describes it, and the rule that texture
+/// cannot pass. What the test knows is the cube as tests/data/make_cubes.py describes it, and the rule that texture
 /// coordinates start at the image's lower left corner in VRML97 (6.46), OBJ and PLY alike. It looks at the film through
 /// a plain box of its own: no reader, no texture and no sampling is trusted.
 namespace hilbrush::testing_pipeline {
@@ -54,7 +54,8 @@ const std::array<std::vector<Stroke>, 6> kNumbers{{
 }};
 
 double distance(const Stroke& s, double x, double y) {
-  const double dx = s.x1 - s.x0, dy = s.y1 - s.y0;
+  const double dx = s.x1 - s.x0;
+  const double dy = s.y1 - s.y0;
   const double t = std::clamp(((x - s.x0) * dx + (y - s.y0) * dy) / (dx * dx + dy * dy), 0., 1.);
   return std::hypot(x - s.x0 - t * dx, y - s.y0 - t * dy);
 }
@@ -64,7 +65,8 @@ Bitmap drawn(const std::vector<Stroke>& strokes, double width_pixels) {
   Bitmap bitmap;
   for (int row = 0; row < kGrid; ++row) {
     for (int column = 0; column < kGrid; ++column) {
-      const double x = kTilePixels * (column + .5) / kGrid, y = kTilePixels * (1 - (row + .5) / kGrid);
+      const double x = kTilePixels * (column + .5) / kGrid;
+      const double y = kTilePixels * (1 - (row + .5) / kGrid);
       const bool is_dark = std::any_of(strokes.begin(), strokes.end(),
                                        [&](const Stroke& s) { return distance(s, x, y) <= width_pixels / 2; });
       bitmap.push_back(is_dark ? 1 : 0);
@@ -75,12 +77,13 @@ Bitmap drawn(const std::vector<Stroke>& strokes, double width_pixels) {
 
 /// The eight ways a square picture can lie on a square: 0 as it should; 1, 2, 3 turned by quarters; 4..7 the same,
 /// mirrored.
-Bitmap transformed(const Bitmap& bitmap, int way) {
+Bitmap transformed(const Bitmap& bitmap, int variant) {
   Bitmap result(bitmap.size());
   for (int row = 0; row < kGrid; ++row) {
     for (int column = 0; column < kGrid; ++column) {
-      int r = row, c = way >= 4 ? kGrid - 1 - column : column;
-      for (int turn = 0; turn < way % 4; ++turn) {
+      int r = row;
+      int c = variant >= 4 ? kGrid - 1 - column : column;
+      for (int turn = 0; turn < variant % 4; ++turn) {
         const int old_r = r;
         r = c;
         c = kGrid - 1 - old_r;
@@ -93,10 +96,20 @@ Bitmap transformed(const Bitmap& bitmap, int way) {
 
 /// Pearson's correlation over the places that `is_counted` (all if empty).
 double correlation(const Bitmap& a, const Bitmap& b, const std::vector<bool>& is_counted = {}) {
-  double n = 0, sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
+  double n = 0;
+  double sum_a = 0;
+  double sum_b = 0;
+  double aa = 0;
+  double bb = 0;
+  double ab = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (!is_counted.empty() && !is_counted[i]) continue;
-    n += 1, sum_a += a[i], sum_b += b[i], aa += a[i] * a[i], bb += b[i] * b[i], ab += a[i] * b[i];
+    n += 1;
+    sum_a += a[i];
+    sum_b += b[i];
+    aa += a[i] * a[i];
+    bb += b[i] * b[i];
+    ab += a[i] * b[i];
   }
   const double variance = (n * aa - sum_a * sum_a) * (n * bb - sum_b * sum_b);
   return variance > 0 ? (n * ab - sum_a * sum_b) / std::sqrt(variance) : 0;
@@ -128,7 +141,8 @@ Bitmap read_face(const Film& film, const Eigen::Vector3d& normal_O, const Eigen:
   Bitmap bitmap;
   for (int row = 0; row < kGrid; ++row) {
     for (int column = 0; column < kGrid; ++column) {
-      const double right = (column + .5) / kGrid - .5, up = (row + .5) / kGrid - .5;
+      const double right = (column + .5) / kGrid - .5;
+      const double up = (row + .5) / kGrid - .5;
       const Eigen::Vector3d p_O = middle_O + kSide_m * (.5 * normal_O + right * right_O + up * up_O);
       bitmap.push_back(film.painted(nearest_point(film.mesh(), p_O)));
     }
@@ -139,8 +153,8 @@ Bitmap read_face(const Film& film, const Eigen::Vector3d& normal_O, const Eigen:
 struct Reading {
   bool is_painted = false;
   double as_it_should = 0;  ///< correlation with the letter, upright and unmirrored ...
-  double best_other = 0;    ///< ... and of the best other way it could lie
-  int best_way = 0;
+  double best_other = 0;    ///< ... and of the best other variant
+  int best_variant = 0;
   int number = 0;  ///< the number that fits best
 };
 
@@ -149,11 +163,13 @@ Reading read_letter(const Bitmap& bitmap) {
   Reading reading;
   reading.is_painted = std::accumulate(bitmap.begin(), bitmap.end(), 0.) / static_cast<double>(bitmap.size()) > .03;
   double best = -1;
-  for (int way = 0; way < 8; ++way) {
-    const double fit = correlation(bitmap, transformed(letter, way));
-    if (way == 0) reading.as_it_should = fit;
-    if (way != 0) reading.best_other = std::max(reading.best_other, fit);
-    if (fit > best) best = fit, reading.best_way = way;
+  for (int variant = 0; variant < 8; ++variant) {
+    const double fit = correlation(bitmap, transformed(letter, variant));
+    if (variant == 0) reading.as_it_should = fit;
+    if (variant != 0) reading.best_other = std::max(reading.best_other, fit);
+    if (fit <= best) continue;
+    best = fit;
+    reading.best_variant = variant;
   }
   // The number's corner: right of the letter, below its middle.
   std::vector<bool> is_corner;
@@ -162,7 +178,9 @@ Reading read_letter(const Bitmap& bitmap) {
   best = -1;
   for (std::size_t k = 0; k < kNumbers.size(); ++k) {
     const double fit = correlation(bitmap, drawn(kNumbers[k], 5), is_corner);
-    if (fit > best) best = fit, reading.number = static_cast<int>(k) + 1;
+    if (fit <= best) continue;
+    best = fit;
+    reading.number = static_cast<int>(k) + 1;
   }
   return reading;
 }
@@ -195,8 +213,8 @@ std::vector<int> paint_and_read(const std::string& file, const char* up) {
     EXPECT_TRUE(reading.is_painted || is_underside) << file << ", " << up << " up: " << kFaces[k].name;
     if (!reading.is_painted) continue;
     painted.push_back(static_cast<int>(k) + 1);
-    EXPECT_EQ(reading.best_way, 0) << file << ", " << up << " up: the letter on the " << kFaces[k].name
-                                   << " lies in way " << reading.best_way;
+    EXPECT_EQ(reading.best_variant, 0) << file << ", " << up << " up: the letter on the " << kFaces[k].name
+                                       << " lies in variant " << reading.best_variant;
     if (is_underside) continue;
     EXPECT_GT(reading.as_it_should, .75) << file << ", " << up << " up: " << kFaces[k].name;
     EXPECT_GT(reading.as_it_should, reading.best_other + .3) << file << ", " << up << " up: " << kFaces[k].name;
@@ -225,18 +243,19 @@ INSTANTIATE_TEST_SUITE_P(Formats, Orientation, testing::Values("letter_cube.wrl"
                          });
 
 TEST(OrientationTest, WouldSeeEveryOtherWay) {
-  // The test tested: a letter that lies in any of the other seven ways, or another number, is told from the right one.
-  for (int way = 0; way < 8; ++way) {
+  // This tests the test itself: a letter that lies in any of the other seven ways, or another number, is distinguished
+  // from the right one.
+  for (int variant = 0; variant < 8; ++variant) {
     std::vector<Stroke> strokes = kLetter;
     Bitmap bitmap = drawn(strokes, 11);
     const Bitmap number = drawn(kNumbers[3], 5);
     for (std::size_t i = 0; i < bitmap.size(); ++i) bitmap[i] = std::max(bitmap[i], number[i]);
-    const Reading reading = read_letter(transformed(bitmap, way));
-    EXPECT_EQ(reading.best_way, way);
-    if (way == 0) {
+    const Reading reading = read_letter(transformed(bitmap, variant));
+    EXPECT_EQ(reading.best_variant, variant);
+    if (variant == 0) {
       EXPECT_EQ(reading.number, 4);
     } else {
-      EXPECT_LT(reading.as_it_should, .6) << "way " << way;
+      EXPECT_LT(reading.as_it_should, .6) << "variant " << variant;
     }
   }
 }

@@ -91,7 +91,7 @@ TEST(PaintedDots, ACutPulseIsInDoubtUntilItIsMadeInFull) {
   EXPECT_EQ(dots.repeated, 0U);
 }
 
-TEST(PaintedDots, TellsRepeatedForeignAndMissingEmissions) {
+TEST(PaintedDots, RepeatedForeignAndMissingEmissionsAreCounted) {
   PaintedProgram painted(10);
   painted.emissions[0] = painted.emissions[1];  // 1 twice, 0 never
   painted.emissions[2].joints[kTilt] += 1e-3;   // belongs to no exposure
@@ -101,7 +101,7 @@ TEST(PaintedDots, TellsRepeatedForeignAndMissingEmissions) {
   EXPECT_EQ(dots.foreign, 1U);
 }
 
-TEST(PaintedDots, TellsHitsThatLandElsewhere) {
+TEST(PaintedDots, HitsThatLandElsewhereAreCounted) {
   PaintedProgram painted(10);
   painted.hits[3].position_O.x() += 25e-6;
   painted.hits[5].is_hit = false;

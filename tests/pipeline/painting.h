@@ -10,8 +10,8 @@
 #include "sim/devices/emission_record.h"
 #include "sim/film/film.h"
 
-/// What the tests of the whole way share: a model painted on the simulated cell, and a plain box of which the test, not
-/// the reader, knows every coordinate, to look at the film on.
+/// Shared by the tests of the whole pipeline: a model painted on the simulated cell, and a plain box of which the test,
+/// not the reader, knows every coordinate, to look at the film on.
 namespace hilbrush::testing_pipeline {
 
 /// tests/data/<name>.

@@ -69,15 +69,15 @@ TEST(PlanningPictures, EmptyPlansHaveThemToo) {
 TEST(PlanningPictures, TimeIsPlottedToItsEnd) {
   const PlannedPlate plate(0, SkipReason::kOccluded);
   const CellDescription cell = load_cell(find_cell("default"));
-  std::size_t told = 0;
+  std::size_t calls = 0;
   TimeSplit last;
   const TimeSplit total = estimate_time(cell, plate.plan.program, [&](std::size_t exposure, const TimeSplit& so_far) {
-    EXPECT_EQ(exposure, told++);
+    EXPECT_EQ(exposure, calls++);
     EXPECT_GE(so_far.total_s(), last.total_s());
     last = so_far;
   });
-  EXPECT_EQ(told, plate.plan.program.exposures.size());
-  EXPECT_DOUBLE_EQ(last.total_s(), total.total_s()) << "the program has no way home";
+  EXPECT_EQ(calls, plate.plan.program.exposures.size());
+  EXPECT_DOUBLE_EQ(last.total_s(), total.total_s()) << "the program has no path home";
 }
 
 }  // namespace

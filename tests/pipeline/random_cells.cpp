@@ -34,7 +34,7 @@ void shake_arm(CellDescription& cell, Dice& dice) {
   cell.lens.radius_m = dice.between(.004, .025);
   cell.lens.near_m = dice.between(.01, .1);
   cell.lens.far_m = cell.lens.near_m + dice.between(.02, .12);
-  // Mostly above everything, sometimes in the way.
+  // Mostly above everything, sometimes an obstacle.
   const double top_m = cell.axes[kJ3].max + (dice.once_in(3) ? dice.between(0, .1) : dice.between(.1, .25));
   arm.fore_link = {.height_m = top_m, .radius_m = dice.between(.01, .06)};
   arm.upper_link = {.height_m = top_m + dice.between(-.05, .05), .radius_m = dice.between(.01, .06)};
@@ -91,7 +91,8 @@ void shake_process(CellDescription& cell, Dice& dice) {
 
 TexturedMesh blob(Dice& dice) {
   TexturedMesh mesh = test::sphere(.5, 8 + dice.upto(12), 5 + dice.upto(8));
-  const Eigen::Vector3d a = dice.in_box(6), b = dice.in_box(6);
+  const Eigen::Vector3d a = dice.in_box(6);
+  const Eigen::Vector3d b = dice.in_box(6);
   const double bumps = dice.between(0, .35);
   for (auto& p : mesh.vertices) p *= 1 + bumps * std::sin(a.dot(p) * 2) * std::cos(b.dot(p) * 2);
   return mesh;

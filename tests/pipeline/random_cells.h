@@ -6,7 +6,7 @@
 #include "planner/cell_model/plan_options.h"
 #include "sampling/model/textured_mesh.h"
 
-/// A cell, an object and settings of planning that nobody thought of, from a seed.
+/// A random cell, object and settings of planning, from a seed.
 namespace hilbrush::testing_pipeline {
 
 struct RandomWork {

@@ -18,7 +18,7 @@
 #include "sim/film/film.h"
 #include "tests/pipeline/tick_witness.h"
 
-/// Cells and objects that nobody thought of, all the way: each program passes its check, the executed motion keeps all
+/// Random cells and objects, through the whole pipeline: each program passes its check, the executed motion keeps all
 /// limits and all clearances on every control tick, and every exposure lands on its dot; or the planner says why not.
 namespace hilbrush::testing_pipeline {
 namespace {
@@ -91,7 +91,7 @@ void expect_painted(const RandomWork& work, const Plan& plan, double pitch_m, Ca
 void run(std::uint64_t seed, Campaign& campaign) {
   RandomWork work = random_work(seed);
   SCOPED_TRACE("seed " + std::to_string(seed) + ", " + work.shape);
-  const std::clock_t begin = std::clock();  // of the processor: a busy machine is nobody's fault
+  const std::clock_t begin = std::clock();  // CPU time: independent of other work on the machine
   ++campaign.works;
   const auto dots = sample(work);
   if (!dots || dots->dots.empty()) {
@@ -110,11 +110,14 @@ void run(std::uint64_t seed, Campaign& campaign) {
   campaign.dots += dots->dots.size();
   campaign.exposed += plan.program.exposures.size();
   const double spent_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  if (spent_s > campaign.slowest_s) campaign.slowest_s = spent_s, campaign.slowest_seed = seed;
+  if (spent_s > campaign.slowest_s) {
+    campaign.slowest_s = spent_s;
+    campaign.slowest_seed = seed;
+  }
 }
 
 TEST(RandomCells, EveryProgramPassesItsCheckAndEveryExposureLands) {
-  // A single one to look into, or so many from there on.
+  // HILBRUSH_SEED runs this seed only; with HILBRUSH_RANDOM_CELLS this many from there on.
   const char* seed_text = std::getenv("HILBRUSH_SEED");
   const char* count_text = std::getenv("HILBRUSH_RANDOM_CELLS");
   const std::uint64_t first = seed_text ? std::strtoull(seed_text, nullptr, 10) : 1;

@@ -69,7 +69,8 @@ INSTANTIATE_TEST_SUITE_P(Files, RealModel,
 TEST(RealModels, EveryVrmlFileIsPaintedOrRefusedWithAReason) {
   if (!models_folder()) GTEST_SKIP() << "SKIPPED: HILBRUSH_TEST_MODELS is not set";
   if (!is_long()) GTEST_SKIP() << "SKIPPED: a hundred models take minutes; tests/run --long runs them";
-  std::size_t painted = 0, refused = 0;
+  std::size_t painted = 0;
+  std::size_t refused = 0;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(models_folder())) {
     std::string ending = entry.path().extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(), ::tolower);

@@ -54,7 +54,8 @@ constexpr const char* kNumbers[]{"/mesh/vertices",
 void expect_counts_add_up(const Json& dots) {
   std::uint64_t skipped = 0;
   for (const auto& [reason, count] : dots.at("skipped").items()) skipped += count.get<std::uint64_t>();
-  const std::uint64_t placed = dots.at("placed"), exposed = dots.at("exposed");
+  const std::uint64_t placed = dots.at("placed");
+  const std::uint64_t exposed = dots.at("exposed");
   EXPECT_EQ(placed,
             exposed + dots.at("in_doubt").get<std::uint64_t>() + dots.at("remaining").get<std::uint64_t>() + skipped);
   EXPECT_EQ(dots.at("in_doubt"), 0) << "a dry run is never interrupted";
