@@ -20,9 +20,10 @@ namespace hilbrush {
 enum class DeviceState { kDisconnected, kConnected, kEnabled, kReady, kMoving, kFault };
 const char* device_state_name(DeviceState state);
 
-/// What every group refuses, whatever its device would say: settling for longer, and targets that are outside of its
-/// bounds by more than rounding (rad, m).
-inline constexpr double kMaxSettleS = 60, kBoundsTolerance = 1e-9;
+/// Every group refuses a longer settle time (s), whatever its device would accept.
+inline constexpr double kMaxSettleS = 60;
+/// Rounding, in rad or m: every group refuses targets that are outside of its bounds by more.
+inline constexpr double kBoundsTolerance = 1e-9;
 
 template <std::size_t N>
 class AxisGroup {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 
 #include "drivers/driver_error.h"
 #include "drivers/link/link.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -16,13 +16,32 @@ constexpr double kReadyPollS = 0.01;      ///< cell: an axis that drifts from it
 constexpr double kReadyPollMinS = 0.001;  ///< wall
 constexpr double kArrivalPollS = 0.0005;  ///< wall, on top of what the exchanges take
 constexpr double kHandshakeS = 0.1;       ///< wall: what a stop waits for a handshake to end
+constexpr double kStepsMax = 2147483647.;
+
+template <std::size_t N>
+std::array<AxisBounds, N> bounds_of(const std::array<ModbusAxisOptions, N>& options) {
+  std::array<AxisBounds, N> bounds;
+  for (std::size_t i = 0; i < N; ++i) bounds[i] = options[i].bounds;
+  return bounds;
+}
+
+/// Which axes are prismatic is not known here.
+template <std::size_t N>
+std::array<AxisLabel, N> numbered_labels() {
+  std::array<AxisLabel, N> labels;
+  for (std::size_t i = 0; i < N; ++i) labels[i] = {"axis " + std::to_string(i + 1), 1, "(rad or m)"};
+  return labels;
+}
 
 }  // namespace
 
 template <std::size_t N>
 DriveGroup<N>::DriveGroup(std::string name, const std::array<ModbusAxisOptions, N>& options,
                           std::array<std::unique_ptr<AxisDrive>, N> drives, Clock& clock)
-    : name_(std::move(name)), options_(options), drives_(std::move(drives)), clock_(clock) {}
+    : options_(options),
+      drives_(std::move(drives)),
+      clock_(clock),
+      group_(mutex_, std::move(name), bounds_of(options), numbered_labels<N>()) {}
 
 template <std::size_t N>
 DriveGroup<N>::~DriveGroup() {
@@ -30,26 +49,11 @@ DriveGroup<N>::~DriveGroup() {
 }
 
 template <std::size_t N>
-void DriveGroup<N>::refuse(const char* participle) const {
-  const std::string is = state_ == DeviceState::kFault ? "it reports a fault: " + fault_
-                                                       : std::string("it is ") + device_state_name(state_);
-  throw DriverError("the " + name_ + " cannot be " + participle + ": " + is);
-}
-
-template <std::size_t N>
-void DriveGroup<N>::require(DeviceState state, const char* participle) {
-  const std::lock_guard lock(mutex_);
-  if (state_ != state) refuse(participle);
-}
-
-template <std::size_t N>
 void DriveGroup<N>::set_fault(const std::string& sentence) {
   {
     const std::lock_guard lock(mutex_);
     forget_target();
-    if (state_ == DeviceState::kFault || state_ == DeviceState::kDisconnected) return;
-    state_ = DeviceState::kFault;
-    fault_ = sentence;
+    if (!group_.set_fault(sentence)) return;
   }
   clock_.wake();
 }
@@ -57,22 +61,22 @@ void DriveGroup<N>::set_fault(const std::string& sentence) {
 /// Under the lock. What a drive holds ahead is forgotten with the target: the next order is sent whole.
 template <std::size_t N>
 void DriveGroup<N>::forget_target() {
-  is_target_current_ = is_in_position_ = false;
+  group_.is_target_current = group_.is_in_position = false;
   ahead_.reset();
 }
 
 template <std::size_t N>
 void DriveGroup<N>::connect() {
-  require(DeviceState::kDisconnected, "connected");
+  group_.require(DeviceState::kDisconnected, "connected");
   for (const auto& drive : drives_) drive->close();
   for (const auto& drive : drives_) drive->connect();
   const Readings readings = read_all();
   {
     const std::lock_guard lock(mutex_);
-    fault_.clear();
+    group_.fault.clear();
     forget_target();
     for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_si(readings[i].position);
-    state_ = DeviceState::kConnected;
+    group_.state = DeviceState::kConnected;
   }
   start_polling();
   try {
@@ -85,20 +89,20 @@ void DriveGroup<N>::connect() {
 
 template <std::size_t N>
 void DriveGroup<N>::enable() {
-  require(DeviceState::kConnected, "enabled");
+  group_.require(DeviceState::kConnected, "enabled");
   {
     const std::lock_guard command(command_mutex_);
     for (const auto& drive : drives_) drive->enable([this] { return stops_waiting_.load() > 0; });
   }
   check_alarms(read_all());
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kConnected) refuse("enabled");
-  state_ = DeviceState::kEnabled;
+  if (group_.state != DeviceState::kConnected) group_.refuse("enabled");
+  group_.state = DeviceState::kEnabled;
 }
 
 template <std::size_t N>
 void DriveGroup<N>::home() {
-  require(DeviceState::kEnabled, "homed");
+  group_.require(DeviceState::kEnabled, "homed");
   {
     const std::lock_guard command(command_mutex_);
     for (const auto& drive : drives_) drive->home([this] { return stops_waiting_.load() > 0; });
@@ -106,10 +110,10 @@ void DriveGroup<N>::home() {
   const Readings readings = read_all();
   check_alarms(readings);
   for (const auto& reading : readings)
-    if (!reading.is_homed) throw DriverError("the " + name_ + " has no reference after homing");
+    if (!reading.is_homed) throw DriverError("the " + group_.name() + " has no reference after homing");
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kEnabled) refuse("homed");
-  state_ = DeviceState::kReady;
+  if (group_.state != DeviceState::kEnabled) group_.refuse("homed");
+  group_.state = DeviceState::kReady;
 }
 
 template <std::size_t N>
@@ -123,12 +127,13 @@ void DriveGroup<N>::disable() noexcept {
     // A drive that can't be asked is off, or its link is lost, which the polling thread reports.
   }
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kDisconnected && state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
+  if (group_.state != DeviceState::kDisconnected && group_.state != DeviceState::kFault)
+    group_.state = DeviceState::kConnected;
 }
 
 template <std::size_t N>
 void DriveGroup<N>::clear_fault() {
-  require(DeviceState::kFault, "cleared of a fault");
+  group_.require(DeviceState::kFault, "cleared of a fault");
   end_polling();
   try {
     const std::lock_guard command(command_mutex_);
@@ -143,29 +148,25 @@ void DriveGroup<N>::clear_fault() {
     }
   } catch (const DriverError& error) {
     const std::lock_guard lock(mutex_);
-    fault_ = error.what();
+    group_.fault = error.what();
     throw;
   }
   {
     const std::lock_guard lock(mutex_);
-    state_ = DeviceState::kConnected;
-    fault_.clear();
+    group_.state = DeviceState::kConnected;
+    group_.fault.clear();
   }
   start_polling();
 }
 
+/// Drives count steps in 32 bits.
 template <std::size_t N>
-void DriveGroup<N>::check_bounds(const Positions& target) const {
-  for (std::size_t i = 0; i < N; ++i) {
-    const AxisBounds& bounds = options_[i].bounds;
-    const double steps = options_[i].scale.to_device(target[i]);
-    const bool is_within = target[i] >= bounds.min - kBoundsTolerance && target[i] <= bounds.max + kBoundsTolerance;
-    if (is_within && std::abs(steps) < 2147483647.) continue;
-    char text[160];
-    std::snprintf(text, sizeof text, "the %s refuses to move axis %zu to %.6g: its limits are %.6g to %.6g (rad or m)",
-                  name_.c_str(), i + 1, target[i], bounds.min, bounds.max);
-    throw DriverError(text);
-  }
+void DriveGroup<N>::check_target(const Positions& target) const {
+  group_.check_bounds(target);
+  for (std::size_t i = 0; i < N; ++i)
+    if (!(std::abs(options_[i].scale.to_device(target[i])) < kStepsMax))
+      throw DriverError("the " + group_.name() + " refuses to move axis " + std::to_string(i + 1) + " to " +
+                        number_text(target[i], 7) + " (rad or m): it is more steps than the drive can count");
 }
 
 template <std::size_t N>
@@ -178,51 +179,43 @@ AxisDrive::Move DriveGroup<N>::order(std::size_t axis, double target) const {
           steps(options.bounds.acceleration_max)};
 }
 
-/// A trapezoidal profile at the cell file's limits; only a hint for whoever waits.
 template <std::size_t N>
 double DriveGroup<N>::travel_s(const Positions& target) const {
-  double longest_s = 0;
-  for (std::size_t i = 0; i < N; ++i) {
-    const double way = std::abs(target[i] - positions_[i]);
-    const double speed = options_[i].bounds.speed_max, rate = options_[i].bounds.acceleration_max;
-    if (!(speed > 0) || !(rate > 0)) continue;
-    longest_s =
-        std::max(longest_s, way * rate < speed * speed ? 2 * std::sqrt(way / rate) : way / speed + speed / rate);
-  }
-  return longest_s;
+  Positions distances;
+  for (std::size_t i = 0; i < N; ++i) distances[i] = std::abs(target[i] - positions_[i]);
+  return group_.travel_s(distances);
 }
 
 template <std::size_t N>
 void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
-  if (!(settle_s >= 0) || settle_s > kMaxSettleS)
-    throw DriverError("the " + name_ + " refuses a settle time that is no time");
-  check_bounds(target);
+  group_.check_settle_time(settle_s);
+  check_target(target);
   const std::unique_lock command(command_mutex_, deadline_in(1));
-  if (!command) throw DriverError("the " + name_ + " is busy");
+  if (!command) throw DriverError("the " + group_.name() + " is busy");
   std::array<AxisDrive::Move, N> moves;
   std::array<bool, N> is_new{}, is_ahead{};
   {
     const std::lock_guard lock(mutex_);
-    if (state_ != DeviceState::kReady) refuse("moved");
-    if (is_target_current_ && !is_in_position_) throw DriverError("the " + name_ + " refuses to move: it is moving");
+    if (group_.state != DeviceState::kReady) group_.refuse("moved");
+    if (group_.is_under_way()) throw DriverError("the " + group_.name() + " refuses to move: it is moving");
     for (std::size_t i = 0; i < N; ++i) {
       moves[i] = order(i, target[i]);
-      is_new[i] = !is_in_position_ || moves[i].target != target_[i].target;
+      is_new[i] = !group_.is_in_position || moves[i].target != target_[i].target;
       is_ahead[i] = ahead_ && ahead_->is_written[i] && ahead_->moves[i] == moves[i];
     }
     // An order to stay, which only settles anew, leaves what is ahead for the move that will follow.
     if (std::find(is_new.begin(), is_new.end(), true) != is_new.end()) ahead_.reset();
-    arrival_s_ = clock_.now_s() + travel_s(target) + settle_s;
+    group_.arrival_s = clock_.now_s() + travel_s(target) + settle_s;
     target_ = moves;
-    settle_s_ = settle_s;
-    is_target_current_ = true;
-    is_accepted_ = is_in_position_ = false;
+    group_.settle_s = settle_s;
+    group_.is_target_current = true;
+    is_accepted_ = group_.is_in_position = false;
     rest_s_ = -1;
   }
   const auto give_up = [this] { return stops_waiting_.load() > 0; };
   try {
     for (std::size_t i = 0; i < N; ++i) {
-      if (give_up()) throw DriverError("the " + name_ + " was stopped");
+      if (give_up()) throw DriverError("the " + group_.name() + " was stopped");
       if (is_new[i]) drives_[i]->start(moves[i], is_ahead[i], give_up);
     }
   } catch (const LinkError& error) {
@@ -230,7 +223,7 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
     throw;
   } catch (const DriverError&) {
     const std::lock_guard lock(mutex_);
-    is_target_current_ = false;
+    group_.is_target_current = false;
     throw;
   }
   const std::lock_guard lock(mutex_);
@@ -242,9 +235,9 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
 
 template <std::size_t N>
 void DriveGroup<N>::prepare(const Positions& target) {
-  check_bounds(target);
+  check_target(target);
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kReady || !is_in_position_) return;
+  if (group_.state != DeviceState::kReady || !group_.is_in_position) return;
   Ahead ahead;
   for (std::size_t i = 0; i < N; ++i) ahead.moves[i] = order(i, target[i]);
   if (ahead_ && ahead_->moves == ahead.moves) return;
@@ -283,29 +276,20 @@ void DriveGroup<N>::write_ahead() {
 template <std::size_t N>
 typename DriveGroup<N>::Status DriveGroup<N>::status() {
   const std::lock_guard lock(mutex_);
-  Status status;
-  const bool is_under_way = state_ == DeviceState::kReady && is_target_current_ && !is_in_position_;
-  status.state = is_under_way ? DeviceState::kMoving : state_;
-  status.positions = positions_;
-  status.in_position = state_ == DeviceState::kReady && is_in_position_;
-  status.fault = fault_;
-  status.in_position_since_s = status.in_position ? in_position_since_s_ : 0;
-  status.read_s = read_s_;
-  return status;
+  return group_.status(positions_, read_s_);
 }
 
 template <std::size_t N>
 double DriveGroup<N>::expected_arrival_s() {
   const std::lock_guard lock(mutex_);
-  const double now_s = clock_.now_s();
-  return is_target_current_ && !is_in_position_ ? std::max(now_s, arrival_s_) : now_s;
+  return group_.expected_arrival_s(clock_.now_s());
 }
 
 template <std::size_t N>
 void DriveGroup<N>::stop() noexcept {
   {
     const std::lock_guard lock(mutex_);
-    if (state_ == DeviceState::kDisconnected || state_ == DeviceState::kConnected) return;
+    if (group_.state == DeviceState::kDisconnected || group_.state == DeviceState::kConnected) return;
     forget_target();
   }
   ++stops_waiting_;
@@ -324,7 +308,7 @@ void DriveGroup<N>::stop() noexcept {
     failure = error.what();
   }
   --stops_waiting_;
-  if (!failure.empty()) set_fault("the " + name_ + " does not confirm a stop: " + failure);
+  if (!failure.empty()) set_fault("the " + group_.name() + " does not confirm a stop: " + failure);
   clock_.wake();
 }
 
@@ -346,7 +330,7 @@ template <std::size_t N>
 void DriveGroup<N>::check_alarms(const Readings& readings) const {
   for (std::size_t i = 0; i < N; ++i)
     if (readings[i].has_fault)
-      throw DriverError("axis " + std::to_string(i + 1) + " of the " + name_ + " reports " +
+      throw DriverError("axis " + std::to_string(i + 1) + " of the " + group_.name() + " reports " +
                         drives_[i]->alarm_text(readings[i].alarm));
 }
 
@@ -368,7 +352,7 @@ template <std::size_t N>
 void DriveGroup<N>::take(const Readings& readings, double begun_s) {
   for (std::size_t i = 0; i < N; ++i)
     if (readings[i].has_fault) {
-      set_fault("axis " + std::to_string(i + 1) + " of the " + name_ + " reports " +
+      set_fault("axis " + std::to_string(i + 1) + " of the " + group_.name() + " reports " +
                 drives_[i]->alarm_text(readings[i].alarm));
       return;
     }
@@ -377,18 +361,18 @@ void DriveGroup<N>::take(const Readings& readings, double begun_s) {
     const std::lock_guard lock(mutex_);
     for (std::size_t i = 0; i < N; ++i) positions_[i] = options_[i].scale.to_si(readings[i].position);
     read_s_ = begun_s;
-    const bool was_in_position = is_in_position_;
-    if (!is_target_current_ || !is_accepted_ || begun_s < accepted_s_ || !is_at_target(readings)) {
+    const bool was_in_position = group_.is_in_position;
+    if (!group_.is_target_current || !is_accepted_ || begun_s < accepted_s_ || !is_at_target(readings)) {
       rest_s_ = -1;
-      is_in_position_ = false;
+      group_.is_in_position = false;
     } else {
       // Rest is counted from the end of the first reading that shows it to the beginning of the last.
       const double now_s = clock_.now_s();
-      is_in_position_ = settle_s_ <= 0 || (rest_s_ >= 0 && begun_s - rest_s_ >= settle_s_);
+      group_.is_in_position = group_.settle_s <= 0 || (rest_s_ >= 0 && begun_s - rest_s_ >= group_.settle_s);
       if (rest_s_ < 0) rest_s_ = now_s;
-      if (is_in_position_ && !was_in_position) in_position_since_s_ = now_s;
+      if (group_.is_in_position && !was_in_position) group_.in_position_since_s = now_s;
     }
-    is_news = is_in_position_ != was_in_position;
+    is_news = group_.is_in_position != was_in_position;
   }
   if (is_news) clock_.wake();
 }
@@ -396,10 +380,10 @@ void DriveGroup<N>::take(const Readings& readings, double begun_s) {
 /// Wall seconds until the next reading. Under the lock.
 template <std::size_t N>
 double DriveGroup<N>::poll_interval_s() const {
-  if (state_ != DeviceState::kReady) return kIdlePollS;
+  if (group_.state != DeviceState::kReady) return kIdlePollS;
   const double ready_s = std::max(clock_.wall_s(kReadyPollS), kReadyPollMinS);
-  if (!is_target_current_ || is_in_position_) return ready_s;
-  const double due_s = rest_s_ >= 0 ? rest_s_ + settle_s_ : arrival_s_ - settle_s_;
+  if (!group_.is_under_way()) return ready_s;
+  const double due_s = rest_s_ >= 0 ? rest_s_ + group_.settle_s : group_.arrival_s - group_.settle_s;
   return std::clamp(clock_.wall_s(due_s - clock_.now_s()), kArrivalPollS, ready_s);
 }
 
@@ -410,7 +394,7 @@ void DriveGroup<N>::poll() {
     poll_asked_.wait_until(lock, deadline_in(poll_interval_s()), [this] { return !is_polling_ || is_poll_due_; });
     if (!is_polling_) return;
     is_poll_due_ = false;
-    if (state_ == DeviceState::kFault) continue;
+    if (group_.state == DeviceState::kFault) continue;
     const bool has_ahead = ahead_.has_value();
     lock.unlock();
     try {
@@ -418,7 +402,7 @@ void DriveGroup<N>::poll() {
       const double begun_s = clock_.now_s();
       take(read_all(), begun_s);
     } catch (const DriverError& error) {
-      set_fault("the " + name_ + " can't be read: " + error.what());
+      set_fault("the " + group_.name() + " can't be read: " + error.what());
     }
     lock.lock();
   }

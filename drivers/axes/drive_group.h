@@ -11,6 +11,7 @@
 
 #include "drivers/axes/axis_drive.h"
 #include "drivers/axis_group.h"
+#include "drivers/axis_group_state.h"
 #include "drivers/clock.h"
 #include "drivers/deadline_mutex.h"
 #include "drivers/device_options.h"
@@ -67,15 +68,12 @@ class DriveGroup final : public AxisGroup<N> {
   void take(const Readings& readings, double begun_s);
   bool is_at_target(const Readings& readings) const;
   void check_alarms(const Readings& readings) const;
-  void check_bounds(const Positions& target) const;
+  void check_target(const Positions& target) const;
   AxisDrive::Move order(std::size_t axis, double target) const;
   double travel_s(const Positions& target) const;
   void set_fault(const std::string& sentence);
-  void require(DeviceState state, const char* participle);
-  [[noreturn]] void refuse(const char* participle) const;
   double poll_interval_s() const;
 
-  const std::string name_;
   const std::array<ModbusAxisOptions, N> options_;
   const std::array<std::unique_ptr<AxisDrive>, N> drives_;
   Clock& clock_;
@@ -86,15 +84,14 @@ class DriveGroup final : public AxisGroup<N> {
   std::mutex mutex_;  ///< of what follows; never held while waiting for a drive
   std::condition_variable poll_asked_;
   bool is_polling_ = false, is_poll_due_ = false;
-  DeviceState state_ = DeviceState::kDisconnected;
-  std::string fault_;
+  AxisGroupState<N> group_;
   Positions positions_{};
-  bool is_target_current_ = false, is_accepted_ = false, is_in_position_ = false;
+  bool is_accepted_ = false;
   std::array<AxisDrive::Move, N> target_{};  ///< in steps
   std::optional<Ahead> ahead_;               ///< of the next move; only while no axis moves
-  double accepted_s_ = 0, settle_s_ = 0, arrival_s_ = 0;
+  double accepted_s_ = 0;
   double rest_s_ = -1;  ///< since when it rests at the target, on the cell's clock; negative: it doesn't
-  double in_position_since_s_ = 0, read_s_ = 0;
+  double read_s_ = 0;
   std::thread thread_;
 };
 

@@ -4,11 +4,11 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <thread>
 
 #include "drivers/driver_error.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace register_map {
@@ -45,7 +45,7 @@ double to_steps(const MappedRegister& reg, std::int64_t value) {
 
 namespace {
 
-constexpr double kWaitPollS = 0.001;  ///< wall, between two looks at a register
+constexpr double kWaitPollS = 0.001;  ///< wall, between two readings of a register
 
 }  // namespace
 
@@ -77,7 +77,7 @@ void MappedDrive::write(const MappedRegister& reg, std::uint32_t value) {
     bus_->write(unit_, reg.address, register_map::encode(reg, value));
 }
 
-/// Each register is asked once, however many tests look at it.
+/// Each register is read once, however many tests use it.
 AxisDrive::Reading MappedDrive::read() {
   std::map<std::size_t, std::int64_t> values;
   const auto value = [&](std::size_t index) {
@@ -102,33 +102,27 @@ std::string MappedDrive::identify() {
   const Reading reading = read();
   std::string text = map_.name + ", unit " + std::to_string(unit_) + " at " + bus_->name();
   if (map_.identity) text += ", identity " + std::to_string(value_of(*map_.identity));
-  char state[120];
-  std::snprintf(state, sizeof state, ": %s%s, at %.0f steps", reading.is_enabled ? "enabled" : "not enabled",
-                reading.is_homed ? "" : ", no reference", reading.position);
-  text += state;
+  text += reading.is_enabled ? ": enabled" : ": not enabled";
+  text += reading.is_homed ? "" : ", no reference";
+  text += ", at " + fixed_text(reading.position, 0) + " steps";
   return reading.has_fault ? text + ", " + alarm_text(reading.alarm) : text;
 }
 
 std::string MappedDrive::alarm_text(std::uint32_t alarm) const {
-  char text[24];
-  std::snprintf(text, sizeof text, "fault 0x%04X", alarm);
-  return text;
+  return "fault 0x" + hex_text(alarm, 4);
 }
 
 void MappedDrive::wait(const RegisterStep& step, const char* gerund, const GiveUp& give_up) {
   const double deadline_s = clock_.now_s() + step.timeout_s;
   for (;;) {
-    // Whether time is up is asked before the look, so that the last look is never older than the time-out.
+    // The clock is read before the register, so that the last reading is never older than the time-out.
     const bool is_late = clock_.now_s() > deadline_s;
     const auto value = static_cast<std::uint32_t>(value_of(step.reg));
     if ((value & step.mask) == step.value) return;
     if (give_up()) throw DriverError("the axis was stopped");
-    if (is_late) {
-      char text[120];
-      std::snprintf(text, sizeof text, ": %s stays 0x%04X while %s", map_.registers[step.reg].name.c_str(), value,
-                    gerund);
-      throw DriverError(bus_->name() + " unit " + std::to_string(unit_) + text + bus_->messages().text());
-    }
+    if (is_late)
+      throw DriverError(bus_->name() + " unit " + std::to_string(unit_) + ": " + map_.registers[step.reg].name +
+                        " stays 0x" + hex_text(value, 4) + " while " + gerund + bus_->messages().text());
     std::this_thread::sleep_for(std::chrono::duration<double>(kWaitPollS));
   }
 }

@@ -7,7 +7,8 @@
 
 #include <cerrno>
 #include <chrono>
-#include <cstdio>
+
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -20,7 +21,7 @@ bool is_exception(int error) {
   return error >= EMBXILFUN && error <= EMBXGTAR;
 }
 
-/// The peer has gone, as against: it is silent, or what it says is damaged.
+/// The peer closed the connection; not: it is silent, or its answer is damaged.
 bool is_hang_up(int error) {
   return error == ECONNRESET || error == EPIPE || error == EBADF || error == ECONNREFUSED || error == EIO ||
          error == ENOTCONN || error == ENXIO;
@@ -36,18 +37,13 @@ void check_descriptors(const std::string& name) {
 
 std::string words_text(std::span<const std::uint16_t> words) {
   std::string text;
-  char word[8];
-  for (const std::uint16_t value : words) {
-    std::snprintf(word, sizeof word, " %04X", value);
-    text += word;
-  }
+  for (const std::uint16_t value : words) text += ' ' + hex_text(value, 4);
   return text;
 }
 
 std::string request_text(const char* verb, int unit, int address, std::size_t count) {
-  char text[80];
-  std::snprintf(text, sizeof text, "unit %d %s 0x%04X x %zu", unit, verb, address, count);
-  return text;
+  return "unit " + std::to_string(unit) + ' ' + verb + " 0x" + hex_text(static_cast<std::uint32_t>(address), 4) +
+         " x " + std::to_string(count);
 }
 
 }  // namespace
@@ -101,7 +97,7 @@ void ModbusBus::exchange(int unit, const std::string& what, int attempts, Exchan
     if (work() >= 0) return;
     const int error = errno;
     messages_.received(modbus_strerror(error));
-    modbus_flush(context_);  // what comes late belongs to nobody
+    modbus_flush(context_);  // an answer that comes late belongs to no request
     const std::string sentence = name_ + ": " + what + ": " + modbus_strerror(error) + messages_.text();
     if (is_exception(error)) throw DriverError(sentence);
     if (is_hang_up(error)) is_open_ = false;

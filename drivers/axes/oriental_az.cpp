@@ -1,10 +1,10 @@
 #include "drivers/axes/oriental_az.h"
 
 #include <chrono>
-#include <cstdio>
 #include <thread>
 
 #include "drivers/driver_error.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace oriental_az {
@@ -50,11 +50,9 @@ AxisDrive::Reading decode_reading(std::uint16_t output, std::span<const std::uin
   return reading;
 }
 
-/// The manual of the very drive says what it means.
+/// What a number means depends on the model of the drive.
 std::string alarm_text(std::uint32_t alarm) {
-  char text[60];
-  std::snprintf(text, sizeof text, "alarm 0x%02X (see the drive's manual)", alarm);
-  return text;
+  return "alarm 0x" + hex_text(alarm, 2) + " (see the drive's manual)";
 }
 
 }  // namespace oriental_az
@@ -71,11 +69,9 @@ void OrientalDrive::connect() {
 
 std::string OrientalDrive::identify() {
   const Reading reading = read();
-  char text[160];
-  std::snprintf(text, sizeof text, "AZ drive, unit %d at %s: %s, at %.0f steps%s%s", unit_, bus_->name().c_str(),
-                reading.is_enabled ? "ready" : "not ready", reading.position, reading.has_fault ? ", " : "",
-                reading.has_fault ? alarm_text(reading.alarm).c_str() : "");
-  return text;
+  return "AZ drive, unit " + std::to_string(unit_) + " at " + bus_->name() + ": " +
+         (reading.is_enabled ? "ready" : "not ready") + ", at " + fixed_text(reading.position, 0) + " steps" +
+         (reading.has_fault ? ", " + alarm_text(reading.alarm) : "");
 }
 
 AxisDrive::Reading OrientalDrive::read() {
@@ -128,7 +124,7 @@ void OrientalDrive::home(const GiveUp& give_up) {
   throw DriverError("the axis does not finish homing");
 }
 
-/// The write says itself that nothing starts, whatever the drive's trigger was left at.
+/// The write sets the trigger to "none", so nothing starts, whatever value the trigger had before.
 bool OrientalDrive::write_ahead(const Move& move, const GiveUp&) {
   bus_->write(unit_, kDirectDataAt, encode_move(move, Trigger::kNone));
   return true;
@@ -140,7 +136,7 @@ void OrientalDrive::start(const Move& move, bool is_ahead, const GiveUp&) {
   bus_->write(unit_, kDirectDataAt, encode_move(move, Trigger::kAllData));
 }
 
-/// The level stays until the next move, so that nobody else's order moves the axis meanwhile.
+/// The level stays until the next move, so that an order from elsewhere cannot move the axis in between.
 void OrientalDrive::stop() {
   set_inputs(kStop);
 }

@@ -4,12 +4,12 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 
 #include "drivers/link/line_codec.h"
+#include "drivers/number_text.h"
 
-namespace hilbrush {
+namespace hilbrush::dobot {
 namespace {
 
 using line_codec::trimmed;
@@ -30,7 +30,7 @@ T value_at(std::string_view bytes, std::size_t offset) {
   return value;
 }
 
-bool read_joints(std::string_view bytes, std::size_t offset, DobotJoints& joints) {
+bool read_joints(std::string_view bytes, std::size_t offset, Joints& joints) {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     joints[i] = value_at<double>(bytes, offset + i * sizeof(double));
     if (!(std::abs(joints[i]) < kFigureMax)) return false;
@@ -39,7 +39,7 @@ bool read_joints(std::string_view bytes, std::size_t offset, DobotJoints& joints
 }
 
 bool is_frame_start(std::string_view bytes) {
-  return value_at<std::uint16_t>(bytes, kLengthAt) == kDobotFrameBytes &&
+  return value_at<std::uint16_t>(bytes, kLengthAt) == kFrameBytes &&
          value_at<std::uint64_t>(bytes, kTestWordAt) == kTestWord;
 }
 
@@ -59,7 +59,7 @@ std::optional<Call> parse_call(std::string_view text) {
 
 }  // namespace
 
-std::string encode_dobot(std::string_view name, std::initializer_list<long> parameters) {
+std::string encode(std::string_view name, std::initializer_list<long> parameters) {
   std::string text(name);
   text += '(';
   for (const long parameter : parameters) {
@@ -69,20 +69,22 @@ std::string encode_dobot(std::string_view name, std::initializer_list<long> para
   return text + ')';
 }
 
-std::string encode_dobot_joint_move(const DobotJoints& joints) {
-  char text[160];
-  std::snprintf(text, sizeof text, "JointMovJ(%.6f,%.6f,%.6f,%.6f)", joints[0], joints[1], joints[2], joints[3]);
-  return text;
+std::string encode_joint_move(const Joints& joints) {
+  std::string text = "JointMovJ(";
+  for (const double joint : joints) {
+    if (text.back() != '(') text += ',';
+    text += fixed_text(joint, 6);
+  }
+  return text + ')';
 }
 
-std::array<std::string, 4> encode_dobot_pulse(int output, long pulse_ms) {
-  return {encode_dobot("DO", {output, 1}), encode_dobot("wait", {pulse_ms}), encode_dobot("DO", {output, 0}),
-          encode_dobot("Sync")};
+std::array<std::string, 4> encode_pulse(int output, long pulse_ms) {
+  return {encode("DO", {output, 1}), encode("wait", {pulse_ms}), encode("DO", {output, 0}), encode("Sync")};
 }
 
-std::optional<DobotReply> decode_dobot_reply(std::string_view text) {
+std::optional<Reply> decode_reply(std::string_view text) {
   text = trimmed(text);
-  DobotReply reply;
+  Reply reply;
   const char* end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data(), end, reply.error);
   if (error != std::errc()) return std::nullopt;
@@ -100,13 +102,13 @@ std::optional<DobotReply> decode_dobot_reply(std::string_view text) {
   return reply;
 }
 
-bool is_dobot_echo(std::string_view echo, std::string_view command) {
+bool is_echo(std::string_view echo, std::string_view command) {
   const auto a = parse_call(echo), b = parse_call(command);
   if (!a || !b || a->commas != b->commas || a->has_parameters != b->has_parameters) return false;
   return line_codec::equals_ignoring_case(a->name, b->name);
 }
 
-std::string dobot_error_text(long error) {
+std::string error_text(long error) {
   constexpr long kNoSuchCommand = -10000, kParameterCount = -20000, kParameterType = -30000, kParameterRange = -40000;
   const auto is_of = [error](long base) { return error < base && error > base - 100; };
   if (error == -1) return "is refused";
@@ -119,42 +121,42 @@ std::string dobot_error_text(long error) {
   return "is refused with error " + std::to_string(error);
 }
 
-const char* dobot_mode_name(DobotMode mode) {
+const char* mode_name(Mode mode) {
   switch (mode) {
-    case DobotMode::kInit:
+    case Mode::kInit:
       return "starting up";
-    case DobotMode::kBrakeOpen:
+    case Mode::kBrakeOpen:
       return "with its brakes open";
-    case DobotMode::kPowerOff:
+    case Mode::kPowerOff:
       return "powered off";
-    case DobotMode::kDisabled:
+    case Mode::kDisabled:
       return "disabled";
-    case DobotMode::kEnabled:
+    case Mode::kEnabled:
       return "enabled and idle";
-    case DobotMode::kDrag:
+    case Mode::kDrag:
       return "being dragged by hand";
-    case DobotMode::kRunning:
+    case Mode::kRunning:
       return "running";
-    case DobotMode::kRecording:
+    case Mode::kRecording:
       return "recording";
-    case DobotMode::kError:
+    case Mode::kError:
       return "in alarm";
-    case DobotMode::kPause:
+    case Mode::kPause:
       return "paused";
-    case DobotMode::kJog:
+    case Mode::kJog:
       return "jogging";
   }
   return "in an unknown mode";
 }
 
-std::optional<DobotFrame> decode_dobot_frame(std::string_view bytes) {
-  if (bytes.size() != kDobotFrameBytes || !is_frame_start(bytes)) return std::nullopt;
+std::optional<Frame> decode_frame(std::string_view bytes) {
+  if (bytes.size() != kFrameBytes || !is_frame_start(bytes)) return std::nullopt;
   // A second test word: the frame broke off, and the next one began in the middle of it.
   const std::string_view test_word(reinterpret_cast<const char*>(&kTestWord), sizeof kTestWord);
   if (bytes.find(test_word, kTestWordAt + 1) != std::string_view::npos) return std::nullopt;
-  DobotFrame frame;
+  Frame frame;
   frame.digital_outputs = value_at<std::uint64_t>(bytes, kDigitalOutputsAt);
-  frame.mode = static_cast<DobotMode>(value_at<std::uint64_t>(bytes, kModeAt));
+  frame.mode = static_cast<Mode>(value_at<std::uint64_t>(bytes, kModeAt));
   frame.time_ms = value_at<std::uint64_t>(bytes, kTimeAt);
   frame.is_enabled = value_at<std::uint8_t>(bytes, kEnabledAt) != 0;
   frame.is_running = value_at<std::uint8_t>(bytes, kRunningAt) != 0;
@@ -165,22 +167,22 @@ std::optional<DobotFrame> decode_dobot_frame(std::string_view bytes) {
   return frame;
 }
 
-void DobotFrameStream::push(std::string_view bytes) {
+void FrameStream::push(std::string_view bytes) {
   buffer_ += bytes;
 }
 
-std::optional<DobotFrame> DobotFrameStream::next() {
+std::optional<Frame> FrameStream::next() {
   std::size_t start = 0;
-  std::optional<DobotFrame> frame;
-  for (; !frame && start + kDobotFrameBytes <= buffer_.size(); ++start)
-    frame = decode_dobot_frame(std::string_view(buffer_).substr(start, kDobotFrameBytes));
+  std::optional<Frame> frame;
+  for (; !frame && start + kFrameBytes <= buffer_.size(); ++start)
+    frame = decode_frame(std::string_view(buffer_).substr(start, kFrameBytes));
   // Without a frame, `start` is where the next one could still begin; with one, just behind its beginning.
   dropped_bytes_ += frame ? start - 1 : start;
-  buffer_.erase(0, frame ? start - 1 + kDobotFrameBytes : start);
+  buffer_.erase(0, frame ? start - 1 + kFrameBytes : start);
   return frame;
 }
 
-std::optional<std::string> DobotReplyStream::next() {
+std::optional<std::string> ReplyStream::next() {
   const std::size_t end = buffer_.find(';');
   if (end == std::string::npos) return std::nullopt;
   std::string reply = buffer_.substr(0, end);
@@ -188,4 +190,4 @@ std::optional<std::string> DobotReplyStream::next() {
   return reply;
 }
 
-}  // namespace hilbrush
+}  // namespace hilbrush::dobot

@@ -11,34 +11,34 @@
 /// Messages of the Dobot 4-axis TCP/IP interface as pure functions (manual "TCP_IP Remote Control Interface Guide
 /// (4axis)", 2024-04-19): ASCII commands and replies of the ports 29999 (dashboard, at once) and 30003 (motion,
 /// queued), and the binary feedback packet of port 30004. Units of the wire: degrees, millimeters, milliseconds.
-namespace hilbrush {
+namespace hilbrush::dobot {
 
 /// J1, J2 in degrees, J3 in mm, J4 in degrees.
-using DobotJoints = std::array<double, 4>;
+using Joints = std::array<double, 4>;
 
 /// `Name(p1,p2)`; whole numbers.
-std::string encode_dobot(std::string_view name, std::initializer_list<long> parameters = {});
+std::string encode(std::string_view name, std::initializer_list<long> parameters = {});
 /// `JointMovJ(j1,j2,j3,j4)` with six decimals: a billionth of a meter at arm's length.
-std::string encode_dobot_joint_move(const DobotJoints& joints);
+std::string encode_joint_move(const Joints& joints);
 /// A pulse on a digital output that the controller times by itself: `DO(i,1)wait(ms)DO(i,0)Sync()`. To be sent in one
 /// write, so that it is queued whole or not at all; Sync is answered when the output is off again.
-std::array<std::string, 4> encode_dobot_pulse(int output, long pulse_ms);
+std::array<std::string, 4> encode_pulse(int output, long pulse_ms);
 
 /// `ErrorID,{values},Name(p1,p2);`
-struct DobotReply {
+struct Reply {
   long error = 0;
   std::string values;   ///< between the braces
   std::string command;  ///< the echo, as sent
 };
 /// `text` without its semicolon. Nothing if it is no reply.
-std::optional<DobotReply> decode_dobot_reply(std::string_view text);
+std::optional<Reply> decode_reply(std::string_view text);
 /// Whether `echo` repeats `command`: same name, without regard to case, and the same number of parameters.
-bool is_dobot_echo(std::string_view echo, std::string_view command);
+bool is_echo(std::string_view echo, std::string_view command);
 /// A sentence's end: "is refused: parameter 2 is out of range".
-std::string dobot_error_text(long error);
+std::string error_text(long error);
 
 /// RobotMode(), and the frame's robot_mode.
-enum class DobotMode : std::uint64_t {
+enum class Mode : std::uint64_t {
   kInit = 1,
   kBrakeOpen = 2,
   kPowerOff = 3,
@@ -51,29 +51,29 @@ enum class DobotMode : std::uint64_t {
   kPause = 10,
   kJog = 11
 };
-const char* dobot_mode_name(DobotMode mode);
+const char* mode_name(Mode mode);
 
 /// What is used of the 1440-byte feedback packet, sent every 8 ms.
-struct DobotFrame {
+struct Frame {
   std::uint64_t digital_outputs = 0;  ///< bit i: output i + 1
-  DobotMode mode = DobotMode::kInit;
+  Mode mode = Mode::kInit;
   std::uint64_t time_ms = 0;  ///< of the controller's own clock
-  DobotJoints setpoint{};     ///< what the controller asks of its axes now
-  DobotJoints actual{};       ///< deg, mm
-  DobotJoints speed{};        ///< deg/s, mm/s
+  Joints setpoint{};          ///< what the controller asks of its axes now
+  Joints actual{};            ///< deg, mm
+  Joints speed{};             ///< deg/s, mm/s
   bool is_enabled = false, is_running = false, has_error = false;
 };
-inline constexpr std::size_t kDobotFrameBytes = 1440;
+inline constexpr std::size_t kFrameBytes = 1440;
 
 /// Nothing unless length, test word and figures are those of a frame.
-std::optional<DobotFrame> decode_dobot_frame(std::string_view bytes);
+std::optional<Frame> decode_frame(std::string_view bytes);
 
 /// Cuts the feedback stream into frames, and finds its place again after bytes were lost.
-class DobotFrameStream {
+class FrameStream {
  public:
   void push(std::string_view bytes);
   /// The next whole frame, or nothing until more is pushed.
-  std::optional<DobotFrame> next();
+  std::optional<Frame> next();
   std::uint64_t dropped_bytes() const { return dropped_bytes_; }
 
  private:
@@ -82,7 +82,7 @@ class DobotFrameStream {
 };
 
 /// Cuts a reply stream at its semicolons. Bounded: throws nothing, and says when a reply has grown too long.
-class DobotReplyStream {
+class ReplyStream {
  public:
   static constexpr std::size_t kReplyMax = 8192;
   void push(std::string_view bytes) { buffer_ += bytes; }
@@ -95,4 +95,4 @@ class DobotReplyStream {
   std::string buffer_;
 };
 
-}  // namespace hilbrush
+}  // namespace hilbrush::dobot

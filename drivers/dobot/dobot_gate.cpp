@@ -40,7 +40,7 @@ bool DobotRobot::OutputGate::is_busy() const {
   return is_pulsing_ || (is_known_off_ && robot_.frame_count_ < known_frame_ + kFramesOfGrace);
 }
 
-const char* DobotRobot::OutputGate::fault_in(const DobotFrame& frame) {
+const char* DobotRobot::OutputGate::fault_in(const dobot::Frame& frame) {
   const bool is_lit = (frame.digital_outputs >> (output_ - 1) & 1) != 0;
   if (!is_lit) return nullptr;
   if (is_known_off_ && robot_.frame_count_ >= known_frame_ + kFramesOfGrace) return "is on though nobody ordered it";
@@ -56,17 +56,17 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
     throw DriverError("the robot times pulses of whole milliseconds only");
   {
     const std::lock_guard lock(robot_.mutex_);
-    if (robot_.state_ != DeviceState::kReady) robot_.refuse("asked for a pulse");
-    if (!robot_.is_in_position_) throw DriverError("the robot refuses a pulse: it is not in position");
+    if (robot_.group_.state != DeviceState::kReady) robot_.group_.refuse("asked for a pulse");
+    if (!robot_.group_.is_in_position) throw DriverError("the robot refuses a pulse: it is not in position");
     if (is_pulsing_) throw DriverError("the robot refuses a pulse: the last one is not over");
     is_pulsing_ = true;
     is_known_off_ = false;
     pulse_ms_ = static_cast<std::uint64_t>(pulse_ms);
     lit_ms_.reset();
   }
-  const auto commands = encode_dobot_pulse(output_, pulse_ms);
+  const auto commands = dobot::encode_pulse(output_, pulse_ms);
   try {
-    robot_.ports_.motion(commands.data(), commands.size(), 1, [this](const DobotReply* reply) {
+    robot_.ports_.motion(commands.data(), commands.size(), 1, [this](const dobot::Reply* reply) {
       if (reply == nullptr || reply->error != 0) return;  // not confirmed: stays as it is until off()
       {
         const std::lock_guard lock(robot_.mutex_);
@@ -86,9 +86,9 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
 /// an empty queue.
 bool DobotRobot::OutputGate::order_off(bool was_pulsing, double wall_s) noexcept {
   try {
-    const std::string off = encode_dobot("DOExecute", {output_, 0});
+    const std::string off = dobot::encode("DOExecute", {output_, 0});
     std::vector<std::string> commands{off};
-    if (was_pulsing) commands = {off, encode_dobot("ResetRobot"), off};
+    if (was_pulsing) commands = {off, dobot::encode("ResetRobot"), off};
     return robot_.ports_.dashboard_all(commands, wall_s).back().error == 0;
   } catch (const std::exception&) {
     return false;
@@ -102,7 +102,8 @@ bool DobotRobot::OutputGate::off() noexcept {
     bool was_pulsing = false;
     {
       const std::lock_guard lock(robot_.mutex_);
-      if (is_known_off_ && robot_.state_ != DeviceState::kDisconnected && robot_.state_ != DeviceState::kFault)
+      if (is_known_off_ && robot_.group_.state != DeviceState::kDisconnected &&
+          robot_.group_.state != DeviceState::kFault)
         return true;
       was_pulsing = is_pulsing_;
     }

@@ -22,7 +22,7 @@ class DobotRobot::OutputGate final : public Gate {
 
   /// Reader's thread, under the robot's mutex: what is wrong if the output is on though nobody ordered it, or longer
   /// than its pulse; else nothing.
-  const char* fault_in(const DobotFrame& frame);
+  const char* fault_in(const dobot::Frame& frame);
   bool is_pulsing() const { return is_pulsing_; }  ///< under the robot's mutex
   /// A pulse is queued or just over, so that the controller may still call itself running. Under the robot's mutex.
   bool is_busy() const;

@@ -15,8 +15,8 @@ using Steady = std::chrono::steady_clock;
 constexpr double kConnectS = 2;
 constexpr std::size_t kOwedMax = 64;
 
-std::string refused(const std::string& command, const DobotReply& reply) {
-  return "the robot: " + command + " " + dobot_error_text(reply.error);
+std::string refused(const std::string& command, const dobot::Reply& reply) {
+  return "the robot: " + command + " " + dobot::error_text(reply.error);
 }
 
 }  // namespace
@@ -69,7 +69,7 @@ void DobotPorts::close() noexcept {
   feedback_.reset();
 }
 
-std::vector<DobotReply> DobotPorts::exchange(const std::vector<std::string>& commands, Deadline deadline) {
+std::vector<dobot::Reply> DobotPorts::exchange(const std::vector<std::string>& commands, Deadline deadline) {
   if (!dashboard_) dashboard_ = open_tcp_link(options_.host, options_.dashboard_port, deadline);
   std::string all;
   for (const std::string& command : commands) all += command;
@@ -77,8 +77,8 @@ std::vector<DobotReply> DobotPorts::exchange(const std::vector<std::string>& com
   const auto fail_with = [&](const char* what) {
     throw LinkError("the robot " + std::string(what) + " to " + all + dashboard_->messages().text());
   };
-  std::vector<DobotReply> replies;
-  DobotReplyStream stream;
+  std::vector<dobot::Reply> replies;
+  dobot::ReplyStream stream;
   while (replies.size() < commands.size()) {
     std::array<char, 1024> bytes{};
     const std::size_t got = dashboard_->read(bytes.data(), bytes.size(), deadline);
@@ -86,8 +86,8 @@ std::vector<DobotReply> DobotPorts::exchange(const std::vector<std::string>& com
     dashboard_->messages().received({bytes.data(), got});
     stream.push({bytes.data(), got});
     while (const auto text = stream.next()) {
-      auto reply = decode_dobot_reply(*text);
-      if (!reply || replies.size() == commands.size() || !is_dobot_echo(reply->command, commands[replies.size()]))
+      auto reply = dobot::decode_reply(*text);
+      if (!reply || replies.size() == commands.size() || !dobot::is_echo(reply->command, commands[replies.size()]))
         fail_with("gives no proper answer");
       replies.push_back(std::move(*reply));
     }
@@ -97,7 +97,7 @@ std::vector<DobotReply> DobotPorts::exchange(const std::vector<std::string>& com
   return replies;
 }
 
-std::vector<DobotReply> DobotPorts::dashboard_all(const std::vector<std::string>& commands, double wall_s) {
+std::vector<dobot::Reply> DobotPorts::dashboard_all(const std::vector<std::string>& commands, double wall_s) {
   const Deadline deadline = deadline_in(wall_s);
   const std::unique_lock lock(dashboard_mutex_, deadline);
   if (!lock) throw LinkError("the robot's dashboard is busy with a command that gets no answer");
@@ -110,7 +110,7 @@ std::vector<DobotReply> DobotPorts::dashboard_all(const std::vector<std::string>
 }
 
 std::string DobotPorts::dashboard(const std::string& command, double wall_s) {
-  const DobotReply reply = dashboard_all({command}, wall_s).front();
+  const dobot::Reply reply = dashboard_all({command}, wall_s).front();
   if (reply.error != 0) throw DriverError(refused(command, reply));
   return reply.values;
 }
@@ -125,7 +125,7 @@ void DobotPorts::motion(const std::string* commands, std::size_t count, std::siz
     for (std::size_t i = 0; i < count; ++i) {
       owed_.push_back({commands[i], i + 1 == count ? on_later : OnReply{}});
       if (i < count - later_count)
-        owed_.back().on_reply = [this, command = commands[i]](const DobotReply* reply) {
+        owed_.back().on_reply = [this, command = commands[i]](const dobot::Reply* reply) {
           const std::lock_guard reply_lock(mutex_);
           if (waited_for_ == 0) return;  // nobody waits any more
           --waited_for_;
@@ -204,7 +204,7 @@ void DobotPorts::run() {
 /// What has come, within a bound: seconds of frames.
 void DobotPorts::read_feedback() {
   constexpr int kReadsMax = 100;
-  std::array<char, 8 * kDobotFrameBytes> bytes{};
+  std::array<char, 8 * dobot::kFrameBytes> bytes{};
   std::size_t got = bytes.size();
   for (int i = 0; i < kReadsMax && got == bytes.size(); ++i) {
     got = feedback_->read(bytes.data(), bytes.size(), Steady::now());
@@ -228,14 +228,14 @@ void DobotPorts::read_motion() {
 
 /// Answers come in the order of the commands. Those to commands that a stop has swept away may be missing.
 void DobotPorts::settle_reply(const std::string& text) {
-  const auto reply = decode_dobot_reply(text);
+  const auto reply = dobot::decode_reply(text);
   if (!reply) throw LinkError("the robot gives no proper answer" + motion_->messages().text());
   OnReply callback;
   {
     const std::lock_guard lock(mutex_);
-    while (!owed_.empty() && owed_.front().is_forgotten && !is_dobot_echo(reply->command, owed_.front().command))
+    while (!owed_.empty() && owed_.front().is_forgotten && !dobot::is_echo(reply->command, owed_.front().command))
       owed_.pop_front();
-    if (owed_.empty() || !is_dobot_echo(reply->command, owed_.front().command))
+    if (owed_.empty() || !dobot::is_echo(reply->command, owed_.front().command))
       throw LinkError("the robot answers what it was not asked" + motion_->messages().text());
     callback = std::move(owed_.front().on_reply);
     owed_.pop_front();

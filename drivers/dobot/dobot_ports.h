@@ -27,7 +27,7 @@ class DobotPorts {
 
   /// From the reader's thread, with no lock held.
   struct Listener {
-    std::function<void(const DobotFrame&)> on_frame;
+    std::function<void(const dobot::Frame&)> on_frame;
     std::function<void(const std::string& sentence)> on_lost;  ///< once: motion or feedback are gone
   };
 
@@ -46,10 +46,10 @@ class DobotPorts {
 
   /// Several commands in one write, so that nothing comes between them; their replies in the same order, refusals
   /// included. @throws LinkError
-  std::vector<DobotReply> dashboard_all(const std::vector<std::string>& commands, double wall_s);
+  std::vector<dobot::Reply> dashboard_all(const std::vector<std::string>& commands, double wall_s);
 
   /// Called by the reader's thread with the reply, or with nothing if it will never come.
-  using OnReply = std::function<void(const DobotReply*)>;
+  using OnReply = std::function<void(const dobot::Reply*)>;
   /// Queues commands in one write and waits until all but `later_count` of them are answered; `on_later` gets the last
   /// one's answer. One thread. @throws LinkError; DriverError if one is refused.
   void motion(const std::string* commands, std::size_t count, std::size_t later_count = 0,
@@ -70,7 +70,7 @@ class DobotPorts {
   void read_motion();
   void settle_reply(const std::string& text);
   void fail(const std::string& sentence);
-  std::vector<DobotReply> exchange(const std::vector<std::string>& commands, Deadline deadline);
+  std::vector<dobot::Reply> exchange(const std::vector<std::string>& commands, Deadline deadline);
 
   const DobotOptions options_;
   const double feedback_silence_s_;  ///< wall
@@ -82,8 +82,8 @@ class DobotPorts {
   std::unique_ptr<Link> motion_, feedback_;
   std::thread reader_;
   int wake_fd_ = -1;
-  DobotFrameStream frames_;
-  DobotReplyStream replies_;
+  dobot::FrameStream frames_;
+  dobot::ReplyStream replies_;
   Deadline feedback_deadline_{};
 
   std::mutex mutex_;  ///< of what follows

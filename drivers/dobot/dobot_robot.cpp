@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "drivers/dobot/dobot_gate.h"
 #include "drivers/driver_error.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -24,40 +24,41 @@ double window_of(const DobotOptions& options, std::size_t joint) {
   return joint == kJ3Index ? options.window_m * 1e3 : options.window_rad * 180 / std::numbers::pi;
 }
 
+std::array<AxisBounds, 4> scaled_bounds(const DobotOptions& options) {
+  std::array<AxisBounds, 4> bounds = options.bounds;
+  for (AxisBounds& axis : bounds) axis.speed_max = axis.speed_max * options.speed_percent / 100;
+  return bounds;
+}
+
+std::array<AxisLabel, 4> joint_labels() {
+  constexpr double kDegreesPerRad = 180 / std::numbers::pi;
+  return {{{"j1", kDegreesPerRad, "degrees"},
+           {"j2", kDegreesPerRad, "degrees"},
+           {"j3", 1e3, "mm"},
+           {"j4", kDegreesPerRad, "degrees"}}};
+}
+
 }  // namespace
 
 DobotRobot::DobotRobot(const DobotOptions& options, Clock& clock)
     : options_(options),
       clock_(clock),
+      group_(mutex_, "robot", scaled_bounds(options), joint_labels()),
       ports_(options, std::max(kSilenceMinS, clock.wall_s(kSilentFrames * kFrameS))) {}
 
 DobotRobot::~DobotRobot() {
   ports_.close();
 }
 
-DobotRobot::Positions DobotRobot::ours(const DobotJoints& joints) const {
+DobotRobot::Positions DobotRobot::ours(const dobot::Joints& joints) const {
   Positions positions;
   for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = options_.scales[i].to_si(joints[i]);
   return positions;
 }
 
-void DobotRobot::refuse(const char* participle) const {
-  const std::string is = state_ == DeviceState::kFault ? "it reports a fault: " + fault_
-                                                       : std::string("it is ") + device_state_name(state_);
-  throw DriverError(std::string("the robot cannot be ") + participle + ": " + is);
-}
-
-void DobotRobot::require(DeviceState state, const char* participle) {
-  const std::lock_guard lock(mutex_);
-  if (state_ != state) refuse(participle);
-}
-
 /// Under the lock. True if it is news.
 bool DobotRobot::set_fault(const std::string& sentence) {
-  is_in_position_ = is_target_current_ = false;
-  if (state_ == DeviceState::kFault || state_ == DeviceState::kDisconnected) return false;
-  state_ = DeviceState::kFault;
-  fault_ = sentence;
+  if (!group_.set_fault(sentence)) return false;
   for (const auto& [output, gate] : gates_) gate->forget();
   return true;
 }
@@ -83,19 +84,19 @@ void DobotRobot::shut_gates() noexcept {
 }
 
 void DobotRobot::connect() {
-  require(DeviceState::kDisconnected, "connected");
-  ports_.dashboard(encode_dobot("RobotMode"));
+  group_.require(DeviceState::kDisconnected, "connected");
+  ports_.dashboard(dobot::encode("RobotMode"));
   {
     const std::lock_guard lock(mutex_);
     frame_count_ = 0;
-    fault_.clear();
-    is_target_current_ = is_in_position_ = false;
+    group_.fault.clear();
+    group_.is_target_current = group_.is_in_position = false;
   }
-  ports_.open({[this](const DobotFrame& frame) { take_frame(frame); },
+  ports_.open({[this](const dobot::Frame& frame) { take_frame(frame); },
                [this](const std::string& sentence) { fail(sentence); }});
   {
     const std::lock_guard lock(mutex_);
-    state_ = DeviceState::kConnected;
+    group_.state = DeviceState::kConnected;
   }
   try {
     const double deadline_s = clock_.now_s() + 2;
@@ -103,10 +104,10 @@ void DobotRobot::connect() {
       {
         const std::lock_guard lock(mutex_);
         if (frame_count_ > 0) {
-          if (state_ == DeviceState::kFault) refuse("connected");  // it is, and can be cleared
+          if (group_.state == DeviceState::kFault) group_.refuse("connected");  // it is, and can be cleared
           return;
         }
-        if (state_ == DeviceState::kFault) throw LinkError(fault_);
+        if (group_.state == DeviceState::kFault) throw LinkError(group_.fault);
       }
       if (clock_.now_s() > deadline_s) throw LinkError("the robot sends no feedback");
       clock_.sleep_until(clock_.now_s() + kFrameS);
@@ -114,58 +115,59 @@ void DobotRobot::connect() {
   } catch (const LinkError&) {
     ports_.close();
     const std::lock_guard lock(mutex_);
-    state_ = DeviceState::kDisconnected;
+    group_.state = DeviceState::kDisconnected;
     throw;
   }
 }
 
-void DobotRobot::wait_for_mode(DobotMode mode, double cell_s, const char* participle) {
+void DobotRobot::wait_for_mode(dobot::Mode mode, double cell_s, const char* participle) {
   const double deadline_s = clock_.now_s() + cell_s;
   for (;;) {
     {
       const std::lock_guard lock(mutex_);
-      if (state_ == DeviceState::kFault) refuse(participle);
+      if (group_.state == DeviceState::kFault) group_.refuse(participle);
       if (frame_.mode == mode) return;
       if (clock_.now_s() > deadline_s)
-        throw DriverError(std::string("the robot cannot be ") + participle + ": it is " + dobot_mode_name(frame_.mode));
+        throw DriverError(std::string("the robot cannot be ") + participle + ": it is " +
+                          dobot::mode_name(frame_.mode));
     }
     clock_.sleep_until(clock_.now_s() + kFrameS);
   }
 }
 
 void DobotRobot::enable() {
-  require(DeviceState::kConnected, "enabled");
-  ports_.dashboard(encode_dobot("EnableRobot"), DobotPorts::kReplyS * 5);
-  wait_for_mode(DobotMode::kEnabled, kEnableS, "enabled");
-  ports_.dashboard(encode_dobot("ResetRobot"));  // a queue that another program left behind must not start to move
-  ports_.dashboard(encode_dobot("SpeedFactor", {options_.speed_percent}));
-  ports_.dashboard(encode_dobot("User", {0}));
-  ports_.dashboard(encode_dobot("Tool", {0}));
-  ports_.dashboard(encode_dobot("CP", {0}));  // no blending: each target is reached
+  group_.require(DeviceState::kConnected, "enabled");
+  ports_.dashboard(dobot::encode("EnableRobot"), DobotPorts::kReplyS * 5);
+  wait_for_mode(dobot::Mode::kEnabled, kEnableS, "enabled");
+  ports_.dashboard(dobot::encode("ResetRobot"));  // a queue that another program left behind must not start to move
+  ports_.dashboard(dobot::encode("SpeedFactor", {options_.speed_percent}));
+  ports_.dashboard(dobot::encode("User", {0}));
+  ports_.dashboard(dobot::encode("Tool", {0}));
+  ports_.dashboard(dobot::encode("CP", {0}));  // no blending: each target is reached
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kConnected) refuse("enabled");
-  state_ = DeviceState::kEnabled;
+  if (group_.state != DeviceState::kConnected) group_.refuse("enabled");
+  group_.state = DeviceState::kEnabled;
 }
 
 void DobotRobot::home() {
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kEnabled) refuse("homed");
-  state_ = DeviceState::kReady;
+  if (group_.state != DeviceState::kEnabled) group_.refuse("homed");
+  group_.state = DeviceState::kReady;
 }
 
 void DobotRobot::disable() noexcept {
   {
     const std::lock_guard lock(mutex_);
-    if (state_ == DeviceState::kDisconnected) return;
+    if (group_.state == DeviceState::kDisconnected) return;
   }
   stop();
   try {
-    ports_.dashboard(encode_dobot("DisableRobot"), DobotPorts::kUrgentS);
+    ports_.dashboard(dobot::encode("DisableRobot"), DobotPorts::kUrgentS);
   } catch (const std::exception&) {
     // It may be powered off already; the frames say what it is.
   }
   const std::lock_guard lock(mutex_);
-  if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
+  if (group_.state != DeviceState::kFault) group_.state = DeviceState::kConnected;
 }
 
 /// Emptying the queue drops the end of a pulse with the rest.
@@ -180,116 +182,95 @@ void DobotRobot::shut_pulses() noexcept {
 }
 
 void DobotRobot::wait_for_alarm_end() {
-  const std::string alarm = std::to_string(static_cast<int>(DobotMode::kError));
+  const std::string alarm = std::to_string(static_cast<int>(dobot::Mode::kError));
   const double deadline_s = clock_.now_s() + 2;
-  while (ports_.dashboard(encode_dobot("RobotMode")) == alarm) {
+  while (ports_.dashboard(dobot::encode("RobotMode")) == alarm) {
     if (clock_.now_s() > deadline_s)
-      throw DriverError("the robot stays in alarm: " + ports_.dashboard(encode_dobot("GetErrorID")));
+      throw DriverError("the robot stays in alarm: " + ports_.dashboard(dobot::encode("GetErrorID")));
     clock_.sleep_until(clock_.now_s() + kFrameS);
   }
 }
 
 /// Everything is connected anew: after a fault it is not known what the ports still owe.
 void DobotRobot::clear_fault() {
-  require(DeviceState::kFault, "cleared of a fault");
+  group_.require(DeviceState::kFault, "cleared of a fault");
   ports_.close();
   {
     const std::lock_guard lock(mutex_);
-    state_ = DeviceState::kDisconnected;
+    group_.state = DeviceState::kDisconnected;
   }
   try {
-    ports_.dashboard(encode_dobot("ResetRobot"));
-    ports_.dashboard(encode_dobot("ClearError"));
-    ports_.dashboard(encode_dobot("continue"));
+    ports_.dashboard(dobot::encode("ResetRobot"));
+    ports_.dashboard(dobot::encode("ClearError"));
+    ports_.dashboard(dobot::encode("continue"));
     wait_for_alarm_end();
     connect();
   } catch (const DriverError& error) {
     const std::lock_guard lock(mutex_);
-    state_ = DeviceState::kFault;
-    fault_ = error.what();
+    group_.state = DeviceState::kFault;
+    group_.fault = error.what();
     throw;
   }
 }
 
-void DobotRobot::check_bounds(const Positions& target) const {
-  for (std::size_t i = 0; i < target.size(); ++i) {
-    const AxisBounds& bounds = options_.bounds[i];
-    if (target[i] >= bounds.min - kBoundsTolerance && target[i] <= bounds.max + kBoundsTolerance) continue;
-    const double factor = i == kJ3Index ? 1e3 : 180 / std::numbers::pi;
-    char text[160];
-    std::snprintf(text, sizeof text, "the robot refuses to move joint %zu to %.4f %s: its limits are %.4f to %.4f",
-                  i + 1, target[i] * factor, i == kJ3Index ? "mm" : "degrees", bounds.min * factor,
-                  bounds.max * factor);
-    throw DriverError(text);
-  }
-}
-
-/// Trapezoidal profiles at the cell file's limits; only a hint for whoever waits.
-double DobotRobot::travel_s(const DobotJoints& from, const DobotJoints& to) const {
-  double longest_s = 0;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    const AxisBounds& bounds = options_.bounds[i];
-    const double way = std::abs(to[i] - from[i]) / options_.scales[i].steps_per_unit;
-    const double speed = bounds.speed_max * options_.speed_percent / 100, rate = bounds.acceleration_max;
-    if (!(speed > 0) || !(rate > 0)) continue;
-    const double seconds = way * rate < speed * speed ? 2 * std::sqrt(way / rate) : way / speed + speed / rate;
-    longest_s = std::max(longest_s, seconds);
-  }
-  return longest_s;
+double DobotRobot::travel_s(const dobot::Joints& from, const dobot::Joints& to) const {
+  Positions distances;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    distances[i] = std::abs(to[i] - from[i]) / options_.scales[i].steps_per_unit;
+  return group_.travel_s(distances);
 }
 
 void DobotRobot::move_to(const Positions& target, double settle_s) {
-  if (!(settle_s >= 0) || settle_s > kMaxSettleS) throw DriverError("the robot refuses a settle time that is no time");
-  check_bounds(target);
-  DobotJoints joints;
+  group_.check_settle_time(settle_s);
+  group_.check_bounds(target);
+  dobot::Joints joints;
   for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = options_.scales[i].to_device(target[i]);
   {
     const std::lock_guard lock(mutex_);
-    if (state_ != DeviceState::kReady) refuse("moved");
+    if (group_.state != DeviceState::kReady) group_.refuse("moved");
     for (const auto& [output, gate] : gates_)
       if (gate->is_pulsing()) throw DriverError("the robot refuses to move: a pulse is not over");
-    if (!is_target_current_ || is_in_position_) queued_ = 0;
+    if (!group_.is_under_way()) queued_ = 0;
     if (queued_ > kLookAhead) throw DriverError("the robot refuses to move: too many targets are ahead");
     ++queued_;
-    const double start_s =
-        std::max(clock_.now_s(), is_target_current_ && !is_in_position_ ? arrival_s_ - settle_s_ : 0);
-    arrival_s_ = start_s + travel_s(is_target_current_ ? target_ : frame_.actual, joints) + settle_s;
+    const double start_s = std::max(clock_.now_s(), group_.is_under_way() ? group_.arrival_s - group_.settle_s : 0);
+    group_.arrival_s = start_s + travel_s(group_.is_target_current ? target_ : frame_.actual, joints) + settle_s;
     target_ = joints;
-    settle_s_ = settle_s;
-    is_target_current_ = true;
-    is_in_position_ = false;
+    group_.settle_s = settle_s;
+    group_.is_target_current = true;
+    group_.is_in_position = false;
     rest_ms_ = -1;
     accepted_ms_ = frame_.time_ms;
   }
-  const std::string command = encode_dobot_joint_move(joints);
+  const std::string command = dobot::encode_joint_move(joints);
   try {
     ports_.motion(&command, 1);
   } catch (const DriverError&) {
     const std::lock_guard lock(mutex_);
-    is_target_current_ = false;
+    group_.is_target_current = false;
     throw;
   }
   const std::lock_guard lock(mutex_);
   accepted_ms_ = std::max(accepted_ms_, frame_.time_ms);
   rest_ms_ = -1;
-  is_in_position_ = false;
+  group_.is_in_position = false;
 }
 
 /// The controller's own account: its profile has ended at the target, nothing turns, nothing is queued.
-bool DobotRobot::is_at_rest(const DobotFrame& frame) const {
+bool DobotRobot::is_at_rest(const dobot::Frame& frame) const {
   // While the queue times a pulse the controller calls itself running; that is no motion where the arm stood already.
   // Before, running is believed: a frame may show the very begin of a move, at no speed yet, and the next one its end.
-  const bool is_pulsing_in_place = is_in_position_ && std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) {
-                                     return gate.second->is_busy();
-                                   });
-  if (!is_pulsing_in_place && (frame.mode != DobotMode::kEnabled || frame.is_running)) return false;
+  const bool is_pulsing_in_place =
+      group_.is_in_position &&
+      std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) { return gate.second->is_busy(); });
+  if (!is_pulsing_in_place && (frame.mode != dobot::Mode::kEnabled || frame.is_running)) return false;
   for (std::size_t i = 0; i < target_.size(); ++i)
     if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) || !(std::abs(frame.speed[i]) <= kRestSpeed))
       return false;
   return true;
 }
 
-bool DobotRobot::is_within_window(const DobotFrame& frame) const {
+bool DobotRobot::is_within_window(const dobot::Frame& frame) const {
   for (std::size_t i = 0; i < target_.size(); ++i)
     if (!(std::abs(frame.actual[i] - target_[i]) <= window_of(options_, i))) return false;
   return true;
@@ -297,11 +278,11 @@ bool DobotRobot::is_within_window(const DobotFrame& frame) const {
 
 /// Under the lock. True if in_position changed. Settling is counted from the first frame that shows rest, although the
 /// profile ended up to a frame earlier: what happened between two frames is not known, and a pulse must not be early.
-bool DobotRobot::judge_arrival(const DobotFrame& frame) {
-  const bool was_in_position = is_in_position_;
-  if (!is_target_current_ || frame.time_ms <= accepted_ms_ || !is_at_rest(frame)) {
+bool DobotRobot::judge_arrival(const dobot::Frame& frame) {
+  const bool was_in_position = group_.is_in_position;
+  if (!group_.is_target_current || frame.time_ms <= accepted_ms_ || !is_at_rest(frame)) {
     rest_ms_ = -1;
-    is_in_position_ = false;
+    group_.is_in_position = false;
     return was_in_position;
   }
   const double time_ms = static_cast<double>(frame.time_ms);
@@ -309,13 +290,13 @@ bool DobotRobot::judge_arrival(const DobotFrame& frame) {
   // Stamps are cut to whole milliseconds: one is added, so that the settle time is never cut short.
   if (rest_ms_ < 0) rest_ms_ = time_ms + kStampMs;
   if (was_in_position && !is_near) rest_ms_ = time_ms + kStampMs;  // it left its place: settling begins anew
-  is_in_position_ = is_near && (settle_s_ <= 0 || time_ms >= rest_ms_ + settle_s_ * 1e3);
-  if (is_in_position_ && !was_in_position) in_position_since_s_ = clock_.now_s();
-  return is_in_position_ != was_in_position;
+  group_.is_in_position = is_near && (group_.settle_s <= 0 || time_ms >= rest_ms_ + group_.settle_s * 1e3);
+  if (group_.is_in_position && !was_in_position) group_.in_position_since_s = clock_.now_s();
+  return group_.is_in_position != was_in_position;
 }
 
 /// Reader's thread.
-void DobotRobot::take_frame(const DobotFrame& frame) {
+void DobotRobot::take_frame(const dobot::Frame& frame) {
   bool is_news = false, has_failed = false;
   {
     const std::lock_guard lock(mutex_);
@@ -323,13 +304,13 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
     ++frame_count_;
     frame_ = frame;
     frame_s_ = clock_.now_s();
-    const bool is_on = state_ == DeviceState::kEnabled || state_ == DeviceState::kReady;
-    const bool is_alive = is_on || state_ == DeviceState::kConnected;
-    if (is_alive && (frame.mode == DobotMode::kError || frame.has_error))
+    const bool is_on = group_.state == DeviceState::kEnabled || group_.state == DeviceState::kReady;
+    const bool is_alive = is_on || group_.state == DeviceState::kConnected;
+    if (is_alive && (frame.mode == dobot::Mode::kError || frame.has_error))
       is_news = set_fault("the robot is in alarm");
-    else if (is_on && frame.mode != DobotMode::kEnabled && frame.mode != DobotMode::kRunning)
-      is_news = set_fault(std::string("the robot is ") + dobot_mode_name(frame.mode));
-    else if (state_ != DeviceState::kFault)
+    else if (is_on && frame.mode != dobot::Mode::kEnabled && frame.mode != dobot::Mode::kRunning)
+      is_news = set_fault(std::string("the robot is ") + dobot::mode_name(frame.mode));
+    else if (group_.state != DeviceState::kFault)
       is_news = judge_arrival(frame);
     for (const auto& [output, gate] : gates_)
       if (const char* fault = gate->fault_in(frame)) {
@@ -337,7 +318,7 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
         gate->forget();
         is_news = set_fault("the robot's output " + std::to_string(output) + " " + fault);
       }
-    has_failed = has_failed || (is_news && state_ == DeviceState::kFault);
+    has_failed = has_failed || (is_news && group_.state == DeviceState::kFault);
   }
   if (has_failed) shut_gates();
   if (is_news) clock_.wake();
@@ -345,32 +326,23 @@ void DobotRobot::take_frame(const DobotFrame& frame) {
 
 DobotRobot::Status DobotRobot::status() {
   const std::lock_guard lock(mutex_);
-  Status status;
-  const bool is_under_way = state_ == DeviceState::kReady && is_target_current_ && !is_in_position_;
-  status.state = is_under_way ? DeviceState::kMoving : state_;
-  status.positions = ours(frame_.actual);
-  status.in_position = state_ == DeviceState::kReady && is_in_position_;
-  status.fault = fault_;
-  status.in_position_since_s = status.in_position ? in_position_since_s_ : 0;
-  status.read_s = frame_s_;
-  return status;
+  return group_.status(ours(frame_.actual), frame_s_);
 }
 
 double DobotRobot::expected_arrival_s() {
   const std::lock_guard lock(mutex_);
-  const double now_s = clock_.now_s();
-  return is_target_current_ && !is_in_position_ ? std::max(now_s, arrival_s_) : now_s;
+  return group_.expected_arrival_s(clock_.now_s());
 }
 
 void DobotRobot::stop() noexcept {
   try {
     {
       const std::lock_guard lock(mutex_);
-      if (state_ == DeviceState::kDisconnected || state_ == DeviceState::kConnected) return;
-      is_target_current_ = is_in_position_ = false;
+      if (group_.state == DeviceState::kDisconnected || group_.state == DeviceState::kConnected) return;
+      group_.is_target_current = group_.is_in_position = false;
     }
     shut_pulses();
-    ports_.dashboard(encode_dobot("ResetRobot"), DobotPorts::kUrgentS);
+    ports_.dashboard(dobot::encode("ResetRobot"), DobotPorts::kUrgentS);
     ports_.forget_owed();
   } catch (const std::exception& error) {
     fail(std::string("the robot does not confirm a stop: ") + error.what());
@@ -388,14 +360,12 @@ Gate& DobotRobot::gate(int output) {
 std::vector<std::string> DobotRobot::identify() {
   std::vector<std::string> lines;
   lines.push_back("Dobot 4-axis controller at " + options_.host);
-  const std::string errors = ports_.dashboard(encode_dobot("GetErrorID"));
+  const std::string errors = ports_.dashboard(dobot::encode("GetErrorID"));
   const std::lock_guard lock(mutex_);
-  lines.push_back(std::string("robot is ") + dobot_mode_name(frame_.mode));
+  lines.push_back(std::string("robot is ") + dobot::mode_name(frame_.mode));
   lines.push_back("alarms: " + errors);
-  char text[160];
-  std::snprintf(text, sizeof text, "joints %.4f, %.4f deg, %.4f mm, %.4f deg", frame_.actual[0], frame_.actual[1],
-                frame_.actual[2], frame_.actual[3]);
-  lines.push_back(text);
+  const auto joint = [this](std::size_t i) { return fixed_text(frame_.actual[i], 4); };
+  lines.push_back("joints " + joint(0) + ", " + joint(1) + " deg, " + joint(2) + " mm, " + joint(3) + " deg");
   return lines;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/axis_group.h"
+#include "drivers/axis_group_state.h"
 #include "drivers/clock.h"
 #include "drivers/device_options.h"
 #include "drivers/dobot/dobot_ports.h"
@@ -50,39 +51,31 @@ class DobotRobot final : public Robot {
   static constexpr std::size_t kLookAhead = 8;
 
   double silence_s() const;
-  void take_frame(const DobotFrame& frame);
-  bool judge_arrival(const DobotFrame& frame);
-  bool is_at_rest(const DobotFrame& frame) const;
-  bool is_within_window(const DobotFrame& frame) const;
+  void take_frame(const dobot::Frame& frame);
+  bool judge_arrival(const dobot::Frame& frame);
+  bool is_at_rest(const dobot::Frame& frame) const;
+  bool is_within_window(const dobot::Frame& frame) const;
   void fail(const std::string& sentence);
   void shut_gates() noexcept;
   void shut_pulses() noexcept;
   void wait_for_alarm_end();
   bool set_fault(const std::string& sentence);
-  void require(DeviceState state, const char* participle);
-  [[noreturn]] void refuse(const char* participle) const;
-  void wait_for_mode(DobotMode mode, double cell_s, const char* participle);
-  void check_bounds(const Positions& target) const;
-  double travel_s(const DobotJoints& from, const DobotJoints& to) const;
-  Positions ours(const DobotJoints& joints) const;
+  void wait_for_mode(dobot::Mode mode, double cell_s, const char* participle);
+  double travel_s(const dobot::Joints& from, const dobot::Joints& to) const;
+  Positions ours(const dobot::Joints& joints) const;
 
   const DobotOptions options_;
   Clock& clock_;
 
   std::mutex mutex_;  ///< of what follows; never held while waiting for the robot
-  DeviceState state_ = DeviceState::kDisconnected;
-  std::string fault_;
+  AxisGroupState<4> group_;
   std::uint64_t frame_count_ = 0;
-  DobotFrame frame_;
+  dobot::Frame frame_;
   double frame_s_ = 0;  ///< when it came
-  bool is_target_current_ = false, is_in_position_ = false;
-  DobotJoints target_{};
-  std::size_t queued_ = 0;  ///< targets since it was in position, or stopped
-  double settle_s_ = 0;
+  dobot::Joints target_{};
+  std::size_t queued_ = 0;         ///< targets since it was in position, or stopped
   std::uint64_t accepted_ms_ = 0;  ///< controller's time of the last frame before the target was accepted
   double rest_ms_ = -1;            ///< controller's time since when it rests at the target; negative: it doesn't
-  double arrival_s_ = 0;           ///< expected
-  double in_position_since_s_ = 0;
   std::map<int, std::unique_ptr<OutputGate>> gates_;
 
   DobotPorts ports_;  ///< last: its reader uses all of the above

@@ -3,8 +3,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <utility>
+
+#include "drivers/number_text.h"
 
 namespace hilbrush::guard {
 namespace {
@@ -46,12 +47,8 @@ std::string encode(const Request& request) {
   const char* name = "";
   for (const auto& [word, verb] : kVerbs)
     if (verb == request.verb) name = word;
-  char text[80];
-  if (has_value(request.verb))
-    std::snprintf(text, sizeof text, "%u %s %.17g", request.number, name, request.value);
-  else
-    std::snprintf(text, sizeof text, "%u %s", request.number, name);
-  return text;
+  const std::string text = std::to_string(request.number) + ' ' + name;
+  return has_value(request.verb) ? text + ' ' + exact_text(request.value) : text;
 }
 
 std::optional<Request> decode_request(std::string_view message) {
@@ -85,10 +82,9 @@ std::optional<Reply> decode_reply(std::string_view message) {
 }
 
 std::string encode(const StatusMessage& message) {
-  char text[160];
-  std::snprintf(text, sizeof text, "status %d %d %d %lld %llu ", static_cast<int>(message.status.state),
-                message.status.interlock_closed ? 1 : 0, message.is_gate_on ? 1 : 0,
-                static_cast<long long>(message.read_ns), static_cast<unsigned long long>(message.looks));
+  const std::string text = "status " + std::to_string(static_cast<int>(message.status.state)) +
+                           (message.status.interlock_closed ? " 1" : " 0") + (message.is_gate_on ? " 1 " : " 0 ") +
+                           std::to_string(message.read_ns) + ' ' + std::to_string(message.looks) + ' ';
   return (text + message.status.fault).substr(0, kMessageMax);
 }
 

@@ -8,12 +8,12 @@
 
 #include <cerrno>
 #include <chrono>
-#include <cstdio>
 #include <cstring>
 #include <thread>
 
 #include "drivers/driver_error.h"
 #include "drivers/link/line_codec.h"
+#include "drivers/number_text.h"
 
 extern char** environ;
 
@@ -63,15 +63,10 @@ int GuardProcess::start(const std::string& program, const std::vector<std::strin
   if (error == 0) return pair[0];
   ::close(pair[0]);
   pid_ = -1;
-  throw DriverError("the laser's guard " + program + " can't be started: " + std::strerror(error));
+  throw DriverError("the laser's guard " + program + " cannot be started: " + std::strerror(error));
 }
 
 std::vector<std::string> to_command_line(const GuardArguments& arguments) {
-  const auto number = [](double value) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.17g", value);
-    return std::string(text);
-  };
   const LaserOptions& laser = arguments.laser;
   return {"--driver",
           arguments.driver,
@@ -82,15 +77,15 @@ std::vector<std::string> to_command_line(const GuardArguments& arguments) {
           "--baud",
           std::to_string(laser.baud),
           "--arm-timeout-s",
-          number(laser.arm_timeout_s),
+          exact_text(laser.arm_timeout_s),
           "--command-gap-s",
-          number(laser.command_gap_s),
+          exact_text(laser.command_gap_s),
           "--heartbeat-s",
-          number(laser.heartbeat_s),
+          exact_text(laser.heartbeat_s),
           "--heartbeats-missed",
           std::to_string(laser.heartbeats_missed),
           "--time-scale",
-          number(arguments.time_scale)};
+          exact_text(arguments.time_scale)};
 }
 
 GuardArguments from_command_line(const std::vector<std::string>& words) {
@@ -102,11 +97,11 @@ GuardArguments from_command_line(const std::vector<std::string>& words) {
     const std::string& value = words[i + 1];
     const auto number = [&](double min, double max) {
       const auto found = line_codec::decode_number(value);
-      if (!found || *found < min || *found > max) throw DriverError(key + " can't be " + value);
+      if (!found || *found < min || *found > max) throw DriverError(key + " cannot be " + value);
       return *found;
     };
     const auto one_of = [&](const char* first, const char* second) {
-      if (value != first && value != second) throw DriverError(key + " can't be " + value);
+      if (value != first && value != second) throw DriverError(key + " cannot be " + value);
       return value == first;
     };
     if (key == "--driver")

@@ -8,10 +8,10 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 
 #include "drivers/driver_error.h"
 #include "drivers/link/link.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -218,9 +218,7 @@ std::string GuardServer::carry_out(const guard::Request& request) {
     }
     case guard::Verb::kPowers: {
       const LaserHead::Powers powers = head_.powers();
-      char text[80];
-      std::snprintf(text, sizeof text, "%.17g %.17g", powers.min_w, powers.max_w);
-      return text;
+      return exact_text(powers.min_w) + ' ' + exact_text(powers.max_w);
     }
     case guard::Verb::kArm:
       check_not_tripped();

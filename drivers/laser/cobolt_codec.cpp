@@ -1,18 +1,16 @@
 #include "drivers/laser/cobolt_codec.h"
 
-#include <cstdio>
-
 #include "drivers/link/line_codec.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush::cobolt {
+
 std::string encode(std::string_view command) {
   return std::string(command) + "\r";
 }
 
 std::string power_command(double power_w) {
-  char text[64];
-  std::snprintf(text, sizeof text, "LASer:PM:POWer:SETPoint %.3f", power_w * 1e3);
-  return text;
+  return "LASer:PM:POWer:SETPoint " + fixed_text(power_w * 1e3, 3);
 }
 
 bool is_ok(std::string_view line) {

@@ -105,18 +105,8 @@ bool CoboltHead::is_answering() noexcept {
   }
 }
 
-std::vector<std::string> CoboltHead::identify() {
-  std::vector<std::string> lines;
-  lines.push_back("model " + ask("glm?") + ", serial number " + ask("gsn?") + ", firmware " + ask("gfv?"));
-  char text[80];
-  std::snprintf(text, sizeof text, "power up to %.4g mW, now set to %.4g mW", powers().max_w * 1e3, read_power() * 1e3);
-  lines.push_back(text);
-  const Condition condition = read_condition();
-  lines.push_back(std::string("key ") + (condition.is_key_in ? "in" : "out") + ", interlock " +
-                  (condition.is_interlock_closed ? "closed" : "open") + ", emission " +
-                  (condition.is_armed ? "armed" : "off"));
-  lines.push_back("faults: " + (condition.fault.empty() ? "none" : condition.fault));
-  return lines;
+std::vector<std::string> CoboltHead::read_names() {
+  return {"model " + ask("glm?") + ", serial number " + ask("gsn?") + ", firmware " + ask("gfv?")};
 }
 
 CoboltGate::CoboltGate(CoboltHead& head, Clock& clock) : head_(head), clock_(clock), thread_([this] { run(); }) {}

@@ -20,7 +20,6 @@ class CoboltHead final : public LineLaser {
       : LineLaser(options, options.command_gap_s, clock), is_gated_by_line_(is_gated_by_line) {}
   ~CoboltHead() override { end_polling(); }
 
-  std::vector<std::string> identify() override;
   void open_beam();  ///< !e
   void shut_beam();  ///< !d
   bool is_answering() noexcept;
@@ -28,6 +27,7 @@ class CoboltHead final : public LineLaser {
  private:
   std::string exchange(Link& link, LineReader& lines, const std::string& command, Deadline deadline) override;
   void set_up() override;
+  std::vector<std::string> read_names() override;
   Powers read_powers() override;
   Condition read_condition() override;
   void prepare_arming() override;

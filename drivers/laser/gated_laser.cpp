@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "drivers/driver_error.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -15,11 +15,20 @@ bool is_within(double value, double min, double max) {
   return value >= min * (1 - kRounding) && value <= max * (1 + kRounding);
 }
 
+std::string milli_text(double value) {
+  return number_text(value * 1e3, 4);
+}
+
+/// "0.5 to 100"
+std::string range_text(double min, double max) {
+  return milli_text(min) + " to " + milli_text(max);
+}
+
 }  // namespace
 
 GatedLaser::GatedLaser(std::unique_ptr<LaserHead> head, Gate& gate, const Limits& limits, Clock& clock)
     : head_(std::move(head)), gate_(gate), limits_(limits), clock_(clock) {
-  // A gate that can't be shut leaves only the emission to be turned off.
+  // If the gate cannot be closed, only disarming the head turns the light off.
   gate_.set_listener([this](bool is_dark) {
     if (is_dark)
       note_dark();
@@ -44,10 +53,8 @@ void GatedLaser::check_powers() {
   if (is_within(limits_.power_min_w, powers.min_w, powers.max_w) &&
       is_within(limits_.power_max_w, powers.min_w, powers.max_w))
     return;
-  char text[200];
-  std::snprintf(text, sizeof text, "the cell file gives the laser %.4g to %.4g mW, but it can do %.4g to %.4g mW",
-                limits_.power_min_w * 1e3, limits_.power_max_w * 1e3, powers.min_w * 1e3, powers.max_w * 1e3);
-  throw DriverError(text);
+  throw DriverError("the cell file gives the laser " + range_text(limits_.power_min_w, limits_.power_max_w) +
+                    " mW, but its own limits are " + range_text(powers.min_w, powers.max_w) + " mW");
 }
 
 void GatedLaser::enable() {
@@ -74,15 +81,10 @@ void GatedLaser::check_ready() {
 /// A gate that counts in whole steps gets the next longer one, at the power that keeps the energy.
 GatedLaser::Timed GatedLaser::timed(double power_w, double pulse_s) const {
   if (!is_within(power_w, limits_.power_min_w, limits_.power_max_w) ||
-      !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s)) {
-    char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "the laser refuses a pulse of %.4g mW and %.4g ms: its limits are %.4g to %.4g mW and %.4g to %.4g ms",
-        power_w * 1e3, pulse_s * 1e3, limits_.power_min_w * 1e3, limits_.power_max_w * 1e3, limits_.pulse_min_s * 1e3,
-        limits_.pulse_max_s * 1e3);
-    throw DriverError(text);
-  }
+      !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s))
+    throw DriverError("the laser refuses a pulse of " + milli_text(power_w) + " mW and " + milli_text(pulse_s) +
+                      " ms: its limits are " + range_text(limits_.power_min_w, limits_.power_max_w) + " mW and " +
+                      range_text(limits_.pulse_min_s, limits_.pulse_max_s) + " ms");
   const double step_s = gate_.resolution_s();
   const double timed_s = step_s > 0 ? std::max(1., std::ceil(pulse_s / step_s - 1e-3)) * step_s : pulse_s;
   return {std::max(power_w * pulse_s / timed_s, limits_.power_min_w), timed_s};
@@ -107,7 +109,7 @@ void GatedLaser::fire(double power_w, double pulse_s) {
     head_->begin_pulse(pulse.pulse_s);
     gate_.pulse(pulse.pulse_s);
   } catch (const DriverError&) {
-    // A gate that refused had nothing to end, and says nothing of it.
+    // A gate that refused the pulse has none to end, so its listener is not called.
     if (gate_.off()) note_dark();
     throw;
   }
@@ -120,7 +122,7 @@ void GatedLaser::note_dark() {
     if (!is_reading_due_ || gate_dark_s_ >= 0) return;
     gate_dark_s_ = clock_.now_s();
   }
-  head_->end_pulse();  // before anybody can begin the next
+  head_->end_pulse();  // before the next can begin
   head_->look();
 }
 

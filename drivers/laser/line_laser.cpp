@@ -1,11 +1,11 @@
 #include "drivers/laser/line_laser.h"
 
 #include <cmath>
-#include <cstdio>
 #include <thread>
 
 #include "drivers/driver_error.h"
 #include "drivers/link/line_codec.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -25,10 +25,11 @@ LineLaser::LineLaser(const LaserOptions& options, double gap_s, Clock& clock)
     : options_(options), gap_s_(gap_s), clock_(clock) {}
 
 std::string LineLaser::ask(const std::string& command, double wall_s) {
-  constexpr int kExchangesAhead = 5;  // of others who wait for the link
+  constexpr int kExchangesAhead = 5;  // of other threads that wait for the link
   const std::unique_lock lock(exchange_mutex_, deadline_in(wall_s + kExchangesAhead * gap_s_));
   if (!lock) throw LinkError("the laser's link is busy with a command that gets no answer");
-  if (gap_s_ > 0 && wall_s > kUrgentS) std::this_thread::sleep_until(next_exchange_);  // darkness does not wait
+  if (gap_s_ > 0 && wall_s > kUrgentS)
+    std::this_thread::sleep_until(next_exchange_);  // what turns light off does not wait
   const Deadline deadline = deadline_in(wall_s);
   try {
     if (!link_) {
@@ -84,6 +85,21 @@ void LineLaser::connect() {
     state_ = DeviceState::kConnected;
   }
   start_polling();
+}
+
+std::vector<std::string> LineLaser::identify() {
+  std::vector<std::string> lines = read_names();
+  const Powers limits = powers();
+  const auto mw = [](double power_w) { return number_text(power_w * 1e3, 4); };
+  const std::string range = limits.min_w > 0 ? mw(limits.min_w) + " to " : "up to ";
+  lines.push_back("power " + range + mw(limits.max_w) + " mW, now set to " + mw(read_power()) + " mW");
+  const Condition condition = read_condition();
+  lines.push_back(std::string("key ") + (condition.is_key_in ? "in" : "out") + ", interlock " +
+                  (condition.is_interlock_closed ? "closed" : "open") + ", emission " +
+                  (condition.is_armed ? "armed" : "off"));
+  const std::string faults = read_faults(condition);
+  lines.push_back("faults: " + (faults.empty() ? "none" : faults));
+  return lines;
 }
 
 LaserHead::Powers LineLaser::powers() {
@@ -182,10 +198,8 @@ void LineLaser::set_power(double power_w) {
     order_power(power_w);
     const double set_w = read_power();
     if (!is_power(set_w, power_w)) {
-      char text[120];
-      std::snprintf(text, sizeof text, "the laser was told %.4g mW and has set itself to %.4g mW", power_w * 1e3,
-                    set_w * 1e3);
-      throw DriverError(text);
+      throw DriverError("the laser was set to " + number_text(power_w * 1e3, 4) + " mW but reports " +
+                        number_text(set_w * 1e3, 4) + " mW");
     }
   } catch (const LinkError& error) {
     set_fault(error.what());
@@ -204,7 +218,7 @@ LaserHead::Status LineLaser::status() {
 void LineLaser::look() {
   {
     const std::lock_guard lock(mutex_);
-    is_look_due_ = true;
+    is_request_due_ = true;
   }
   asked_.notify_all();
 }
@@ -278,26 +292,24 @@ void LineLaser::check_power() {
   if (!wanted_w) return;
   const double power_w = read_power();
   if (is_power(power_w, *wanted_w)) return;
-  char text[120];
-  std::snprintf(text, sizeof text, "the laser has changed its power from %.4g to %.4g mW by itself", *wanted_w * 1e3,
-                power_w * 1e3);
-  throw DriverError(text);
+  throw DriverError("the laser has changed its power from " + number_text(*wanted_w * 1e3, 4) + " to " +
+                    number_text(power_w * 1e3, 4) + " mW by itself");
 }
 
 void LineLaser::poll() {
   std::unique_lock lock(mutex_);
   while (is_polling_) {
-    asked_.wait_until(lock, deadline_in(kPollS), [this] { return !is_polling_ || is_look_due_; });
+    asked_.wait_until(lock, deadline_in(kPollS), [this] { return !is_polling_ || is_request_due_; });
     if (!is_polling_) return;
-    const bool was_asked = is_look_due_;
-    is_look_due_ = false;
-    if (state_ == DeviceState::kFault || is_arming_) continue;  // whoever arms it reads it himself
+    const bool was_asked = is_request_due_;
+    is_request_due_ = false;
+    if (state_ == DeviceState::kFault || is_arming_) continue;  // bring_up() reads it itself
     const bool was_closed = condition_.is_interlock_closed;
     lock.unlock();
     try {
       const double begun_s = clock_.now_s();
       const Condition condition = read_condition();
-      if (was_asked && gap_s_ <= 0) check_power();  // where commands must keep a distance that would cost too much
+      if (was_asked && gap_s_ <= 0) check_power();  // a gap between commands would make it too slow
       take(condition, begun_s);
       if ((was_asked || was_closed != condition.is_interlock_closed) && on_change_) on_change_();
     } catch (const DriverError& error) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "drivers/clock.h"
 #include "drivers/deadline_mutex.h"
@@ -15,12 +16,13 @@
 
 namespace hilbrush {
 
-/// What lasers that are asked and answer in lines have in common: one exchange at a time with a deadline, the life
-/// cycle of a head, and a thread that reads the laser's condition ten times a second and when asked. A link that
-/// failed is opened anew by the next exchange, because the answers' places in it are unknown.
+/// What lasers with a line protocol have in common: one exchange at a time with a deadline, the life cycle of a head,
+/// and a thread that reads the laser's condition ten times a second and on request. The next exchange opens a link
+/// that failed again, because it is not known which command the answers still on it belong to.
 class LineLaser : public LaserHead {
  public:
   void connect() override;
+  std::vector<std::string> identify() override;
   Powers powers() override;
   void arm() override;
   bool disarm() noexcept override;
@@ -30,7 +32,7 @@ class LineLaser : public LaserHead {
   void clear_fault() override;
   void set_listener(std::function<void()> on_change) override { on_change_ = std::move(on_change); }
 
-  /// The link's descriptor, for the last words of a dying process; -1 if not open.
+  /// The link's descriptor, for the last command of a dying process; -1 if not open.
   int descriptor() const { return descriptor_.load(); }
 
  protected:
@@ -47,12 +49,15 @@ class LineLaser : public LaserHead {
     std::string fault;      ///< what else is wrong
   };
 
-  // What each laser says in its own words. All but the first are called with no lock held and use ask().
+  // What differs between lasers. All but the first are called with no lock held and use ask().
   /// One exchange on the open link. @throws LinkError; DriverError if the laser refuses.
   virtual std::string exchange(Link& link, LineReader& lines, const std::string& command, Deadline deadline) = 0;
-  virtual void set_up() = 0;  ///< a quiet, known state; emission off
+  virtual void set_up() = 0;                          ///< a quiet, known state; emission off
+  virtual std::vector<std::string> read_names() = 0;  ///< model, serial number: lines for the operator
   virtual Powers read_powers() = 0;
   virtual Condition read_condition() = 0;
+  /// For the operator; empty: none.
+  virtual std::string read_faults(const Condition& condition) { return condition.fault; }
   virtual void prepare_arming() = 0;  ///< the modulation mode, read back
   virtual void order_emission() = 0;
   virtual void stop_emission(double wall_s) = 0;
@@ -61,7 +66,7 @@ class LineLaser : public LaserHead {
 
   std::string ask(const std::string& command, double wall_s = kReplyS);
   double ask_number(const std::string& query);
-  /// Bytes that are not answered, now, even while an exchange waits for its answer. @throws LinkError
+  /// Sends bytes that are not answered, at once, even while an exchange waits for its answer. @throws LinkError
   void say(std::string_view bytes, double wall_s);
   Clock& clock() { return clock_; }
 
@@ -94,7 +99,7 @@ class LineLaser : public LaserHead {
   std::string fault_;
   Condition condition_;
   double read_s_ = 0;
-  bool is_polling_ = false, is_look_due_ = false, is_disarming_ = false, is_arming_ = false;
+  bool is_polling_ = false, is_request_due_ = false, is_disarming_ = false, is_arming_ = false;
   Powers powers_;
   std::optional<double> power_w_;  ///< as last read back
   std::thread thread_;

@@ -1,11 +1,12 @@
 #include "drivers/laser/obis_codec.h"
 
 #include <charconv>
-#include <cstdio>
 
 #include "drivers/link/line_codec.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush::obis {
+
 using line_codec::equals_ignoring_case;
 using line_codec::trimmed;
 
@@ -14,9 +15,7 @@ std::string encode(std::string_view command) {
 }
 
 std::string power_command(double power_w) {
-  char text[64];
-  std::snprintf(text, sizeof text, "SOUR:POW:LEV:IMM:AMPL %.6f", power_w);
-  return text;
+  return "SOUR:POW:LEV:IMM:AMPL " + fixed_text(power_w, 6);
 }
 
 LineKind classify(std::string_view line) {

@@ -1,6 +1,5 @@
 #include "drivers/laser/obis_head.h"
 
-#include <cstdio>
 #include <optional>
 
 #include "drivers/driver_error.h"
@@ -51,11 +50,15 @@ LaserHead::Powers ObisHead::read_powers() {
   return {ask_number("SOUR:POW:LIM:LOW?"), ask_number("SOUR:POW:LIM:HIGH?")};
 }
 
-std::string ObisHead::read_faults() {
+std::string ObisHead::ask_faults() {
   const std::string line = ask("SYST:FAUL?");
   const auto faults = obis::decode_hex_word(line);
   if (!faults) throw DriverError("the laser answers SYST:FAUL? with \"" + line + "\"");
   return obis::fault_text(*faults);
+}
+
+std::string ObisHead::read_faults(const Condition&) {
+  return ask_faults();
 }
 
 /// The fault bit comes with an open interlock too, which has its own words.
@@ -68,7 +71,7 @@ LineLaser::Condition ObisHead::read_condition() {
   condition.is_key_in = (*word & obis::kKeyOut) == 0;
   condition.is_armed = (*word & obis::kEmission) != 0 && (*word & (obis::kStartDelay | obis::kWarmUp)) == 0;
   if ((*word & obis::kAnyFault) != 0 && condition.is_interlock_closed && condition.is_key_in) {
-    const std::string faults = read_faults();
+    const std::string faults = ask_faults();
     condition.fault = faults.empty() ? "a fault without a name" : "a fault: " + faults;
   }
   return condition;
@@ -97,22 +100,10 @@ double ObisHead::read_power() {
   return ask_number("SOUR:POW:LEV:IMM:AMPL?");
 }
 
-std::vector<std::string> ObisHead::identify() {
-  std::vector<std::string> lines;
-  lines.push_back(ask("*IDN?"));
-  lines.push_back("model " + ask("SYST:INF:MOD?") + ", serial number " + ask("SYST:INF:SNUM?") + ", " +
-                  ask("SYST:INF:WAV?") + " nm");
-  char text[120];
-  std::snprintf(text, sizeof text, "power %.4g to %.4g mW, now set to %.4g mW", powers().min_w * 1e3,
-                powers().max_w * 1e3, read_power() * 1e3);
-  lines.push_back(text);
-  const Condition condition = read_condition();
-  lines.push_back(std::string("key ") + (condition.is_key_in ? "in" : "out") + ", interlock " +
-                  (condition.is_interlock_closed ? "closed" : "open") + ", emission " +
-                  (condition.is_armed ? "armed" : "off"));
-  const std::string faults = read_faults();
-  lines.push_back("faults: " + (faults.empty() ? "none" : faults));
-  return lines;
+std::vector<std::string> ObisHead::read_names() {
+  const std::string identity = ask("*IDN?");
+  return {identity, "model " + ask("SYST:INF:MOD?") + ", serial number " + ask("SYST:INF:SNUM?") + ", " +
+                        ask("SYST:INF:WAV?") + " nm"};
 }
 
 }  // namespace hilbrush

@@ -1,7 +1,8 @@
 #include "drivers/link/message_ring.h"
 
 #include <algorithm>
-#include <cstdio>
+
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 
@@ -26,15 +27,11 @@ std::string MessageRing::text(std::size_t count) const {
     text += entry.is_sent ? "sent \"" : "received \"";
     for (std::size_t k = 0; k < entry.size; ++k) {
       const auto byte = static_cast<unsigned char>(entry.bytes[k]);
-      char escaped[8];
-      std::snprintf(escaped, sizeof escaped, byte >= 0x20 && byte < 0x7F ? "%c" : "\\x%02X", byte);
-      text += escaped;
+      text += byte >= 0x20 && byte < 0x7F ? std::string(1, entry.bytes[k]) : "\\x" + hex_text(byte, 2);
     }
-    char age[40];
     const double ago_s = std::chrono::duration<double>(now - entry.time).count();
-    std::snprintf(age, sizeof age, ago_s < 1 ? "%s\" %.1f ms ago" : "%s\" %.1f s ago", entry.is_cut ? "..." : "",
-                  ago_s < 1 ? ago_s * 1e3 : ago_s);
-    text += age;
+    text += entry.is_cut ? "...\" " : "\" ";
+    text += ago_s < 1 ? fixed_text(ago_s * 1e3, 1) + " ms ago" : fixed_text(ago_s, 1) + " s ago";
   }
   return text.empty() ? text : text + ")";
 }

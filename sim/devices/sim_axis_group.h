@@ -1,13 +1,13 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <mutex>
 #include <numbers>
 #include <string>
 
 #include "drivers/axis_group.h"
+#include "drivers/axis_group_state.h"
 #include "drivers/driver_error.h"
 #include "planner/cell_model/cell_description.h"
 #include "sim/devices/axis_motion.h"
@@ -20,30 +20,29 @@ namespace hilbrush {
 /// home positions.
 ///
 /// Two truths about rest are kept apart: `in_position` of the status is what the controller reports, after the settle
-/// time that move_to() was told; is_settled() is what the mechanics did, by the cell's own settle figures. A caller who
-/// asks for too short a settle time can see the first and is betrayed by the second.
+/// time that move_to() was given; is_settled() is what the mechanics did, by the cell's own settle times. They differ
+/// if the settle time asked for was too short: a pulse is then recorded as fired while the axes moved.
 template <std::size_t N>
 class SimAxisGroup final : public AxisGroup<N> {
  public:
   using Positions = typename AxisGroup<N>::Positions;
   using Status = typename AxisGroup<N>::Status;
 
-  /// Told, under the lock, before anything begins to move.
+  /// Called, under the lock, before anything begins to move.
   using MotionListener = std::function<void(double now_s)>;
 
   /// `mutex` guards the whole simulated cell. `first_axis` is this group's first among the cell's six.
-  SimAxisGroup(std::string name, const CellDescription& cell, int first_axis, std::mutex& mutex, SimClock& clock,
-               MotionListener listener)
-      : name_(std::move(name)),
-        timing_(cell.timing),
-        first_axis_(first_axis),
+  SimAxisGroup(std::string name, const CellDescription& cell, std::size_t first_axis, std::mutex& mutex,
+               SimClock& clock, MotionListener listener)
+      : timing_(cell.timing),
         mutex_(mutex),
         clock_(clock),
-        on_motion_(std::move(listener)) {
+        on_motion_(std::move(listener)),
+        group_(mutex, std::move(name), bounds_of(cell, first_axis), labels_of(first_axis)) {
+    group_.is_target_current = true;  // at home
     for (std::size_t i = 0; i < N; ++i) {
       axes_[i] = cell.axes[first_axis + i];
       motions_[i] = AxisMotion(axes_[i].home);
-      target_[i] = axes_[i].home;
     }
   }
 
@@ -53,23 +52,22 @@ class SimAxisGroup final : public AxisGroup<N> {
   void clear_fault() override {
     advance(DeviceState::kFault, DeviceState::kConnected, "cleared of a fault");
     const std::lock_guard lock(mutex_);
-    fault_.clear();
+    group_.fault.clear();
   }
 
   void disable() noexcept override {
     const std::lock_guard lock(mutex_);
-    if (state_ == DeviceState::kDisconnected) return;
+    if (group_.state == DeviceState::kDisconnected) return;
     brake(clock_.now_s());
-    if (state_ != DeviceState::kFault) state_ = DeviceState::kConnected;
+    if (group_.state != DeviceState::kFault) group_.state = DeviceState::kConnected;
   }
 
   void move_to(const Positions& target, double settle_s) override {
     const std::lock_guard lock(mutex_);
-    const double now = clock_.now_s();
-    if (state_now(now) != DeviceState::kReady) refuse("moved", now);
-    if (!(settle_s >= 0) || settle_s > kMaxSettleS)
-      throw DriverError("the " + name_ + " refuses a settle time that is no time");
-    for (std::size_t i = 0; i < N; ++i) check_limits(i, target[i]);
+    const double now = update();
+    if (group_.shown_state() != DeviceState::kReady) group_.refuse("moved");
+    group_.check_settle_time(settle_s);
+    group_.check_bounds(target);
 
     on_motion_(now);
     double end = now, share = 0;
@@ -79,24 +77,22 @@ class SimAxisGroup final : public AxisGroup<N> {
       motions_[i] = motions_[i].move_to(target[i], now, axes_[i].speed_max, axes_[i].acceleration_max);
       end = std::max(end, motions_[i].end_s());
     }
-    target_ = target;
     rest_s_ = end;
     settled_s_ = end + timing_.settle_min_s + (timing_.settle_max_s - timing_.settle_min_s) * share;
-    in_position_s_ = now + whole_ticks(end - now) + settle_s;
-    is_target_current_ = true;
+    group_.arrival_s = now + whole_ticks(end - now) + settle_s;
+    group_.is_target_current = true;
   }
 
   Status status() override {
     const std::lock_guard lock(mutex_);
-    const double now = clock_.now_s();
-    const bool in_position = state_ == DeviceState::kReady && is_target_current_ && now >= in_position_s_;
-    return {state_now(now), positions_at(now), in_position, fault_};
+    const double now = update();
+    return group_.status(positions_at(now), 0);
   }
 
   double expected_arrival_s() override {
     const std::lock_guard lock(mutex_);
-    const double now = clock_.now_s();
-    return is_target_current_ ? std::max(now, in_position_s_) : now;
+    const double now = update();
+    return group_.expected_arrival_s(now);
   }
 
   void stop() noexcept override {
@@ -108,8 +104,8 @@ class SimAxisGroup final : public AxisGroup<N> {
   void fail(const std::string& fault) {
     const std::lock_guard lock(mutex_);
     brake(clock_.now_s());
-    state_ = DeviceState::kFault;
-    fault_ = fault;
+    group_.state = DeviceState::kFault;
+    group_.fault = fault;
   }
 
   /// The caller holds the cell's mutex.
@@ -125,37 +121,36 @@ class SimAxisGroup final : public AxisGroup<N> {
   }
 
  private:
-  static constexpr double kMaxSettleS = 60;
+  static std::array<AxisBounds, N> bounds_of(const CellDescription& cell, std::size_t first_axis) {
+    std::array<AxisBounds, N> bounds;
+    for (std::size_t i = 0; i < N; ++i) {
+      const AxisDescription& axis = cell.axes[first_axis + i];
+      bounds[i] = {axis.min, axis.max, axis.speed_max, axis.acceleration_max};
+    }
+    return bounds;
+  }
+  static std::array<AxisLabel, N> labels_of(std::size_t first_axis) {
+    std::array<AxisLabel, N> labels;
+    for (std::size_t i = 0; i < N; ++i) {
+      const std::size_t axis = first_axis + i;
+      labels[i] = axis == kJ3 ? AxisLabel{kAxisNames[axis], 1e3, "mm"}
+                              : AxisLabel{kAxisNames[axis], 180 / std::numbers::pi, "degrees"};
+    }
+    return labels;
+  }
 
-  /// kReady turns to kMoving and back by itself, with time.
-  DeviceState state_now(double now) const {
-    const bool is_under_way = is_target_current_ && now < in_position_s_;
-    return state_ == DeviceState::kReady && is_under_way ? DeviceState::kMoving : state_;
+  /// The present time; whether the group has arrived changes with it.
+  double update() {
+    const double now = clock_.now_s();
+    group_.is_in_position = group_.is_target_current && now >= group_.arrival_s;
+    return now;
   }
 
   void advance(DeviceState from, DeviceState to, const char* participle) {
     const std::lock_guard lock(mutex_);
-    if (state_ != from) refuse(participle, clock_.now_s());
-    state_ = to;
-  }
-
-  [[noreturn]] void refuse(const char* participle, double now) const {
-    const DeviceState state = state_now(now);
-    const std::string is = state == DeviceState::kFault ? "it reports a fault: " + fault_
-                                                        : std::string("it is ") + device_state_name(state);
-    throw DriverError("the " + name_ + " cannot be " + participle + ": " + is);
-  }
-
-  void check_limits(std::size_t i, double target) const {
-    constexpr double kRounding = 1e-9;
-    const AxisDescription& axis = axes_[i];
-    if (target >= axis.min - kRounding && target <= axis.max + kRounding) return;
-    const int index = first_axis_ + static_cast<int>(i);
-    const double unit = index == kJ3 ? 1e-3 : std::numbers::pi / 180;
-    char text[160];
-    std::snprintf(text, sizeof text, "the %s refuses %s = %.3f %s: its limits are %.3f and %.3f", name_.c_str(),
-                  kAxisNames[index], target / unit, index == kJ3 ? "mm" : "degrees", axis.min / unit, axis.max / unit);
-    throw DriverError(text);
+    update();
+    if (group_.state != from) group_.refuse(participle);
+    group_.state = to;
   }
 
   double whole_ticks(double duration_s) const {
@@ -166,7 +161,7 @@ class SimAxisGroup final : public AxisGroup<N> {
 
   void brake(double now) {
     if (now >= rest_s_) {
-      if (now < in_position_s_) is_target_current_ = false;
+      if (now < group_.arrival_s) group_.is_target_current = false;
       return;
     }
     const double ring_s = settled_s_ - rest_s_;
@@ -176,25 +171,19 @@ class SimAxisGroup final : public AxisGroup<N> {
       rest_s_ = std::max(rest_s_, motions_[i].end_s());
     }
     settled_s_ = rest_s_ + ring_s;
-    is_target_current_ = false;
+    group_.is_target_current = false;
   }
 
-  const std::string name_;
   const CellDescription::Timing timing_;
-  const int first_axis_;
   std::mutex& mutex_;
   SimClock& clock_;
   const MotionListener on_motion_;
 
   std::array<AxisDescription, N> axes_;
   std::array<AxisMotion, N> motions_;
-  DeviceState state_ = DeviceState::kDisconnected;
-  std::string fault_;
-  Positions target_{};
-  bool is_target_current_ = true;  ///< false after a stop on the way
-  double rest_s_ = 0;              ///< when the last axis comes to rest
-  double settled_s_ = 0;           ///< when the mechanics have rung down
-  double in_position_s_ = 0;       ///< when the controller reports in position
+  AxisGroupState<N> group_;  ///< its arrival_s is exact: when the controller reports in position
+  double rest_s_ = 0;        ///< when the last axis comes to rest
+  double settled_s_ = 0;     ///< when the mechanics have rung down
 };
 
 }  // namespace hilbrush

@@ -24,25 +24,25 @@ inline void decode_as_every_device(std::string_view bytes) {
   };
   const std::size_t cut = bytes.empty() ? 0 : static_cast<unsigned char>(bytes[0]) % (bytes.size() + 1);
 
-  DobotFrameStream frames;
+  dobot::FrameStream frames;
   std::size_t whole = 0;
   for (const std::string_view piece : {bytes.substr(0, cut), bytes.substr(cut)}) {
     frames.push(piece);
     while (const auto frame = frames.next()) {
       ++whole;
       for (std::size_t i = 0; i < 4; ++i) promise(std::isfinite(frame->actual[i]) && std::isfinite(frame->setpoint[i]));
-      dobot_mode_name(frame->mode);
+      dobot::mode_name(frame->mode);
     }
   }
-  promise(whole * kDobotFrameBytes + frames.dropped_bytes() <= bytes.size());
+  promise(whole * dobot::kFrameBytes + frames.dropped_bytes() <= bytes.size());
 
-  DobotReplyStream replies;
+  dobot::ReplyStream replies;
   for (const std::string_view piece : {bytes.substr(0, cut), bytes.substr(cut)}) {
     replies.push(piece);
     while (const auto text = replies.next())
-      if (const auto reply = decode_dobot_reply(*text)) {
-        promise(is_dobot_echo(reply->command, reply->command));
-        promise(!dobot_error_text(reply->error).empty());
+      if (const auto reply = dobot::decode_reply(*text)) {
+        promise(dobot::is_echo(reply->command, reply->command));
+        promise(!dobot::error_text(reply->error).empty());
       }
   }
 

@@ -106,9 +106,9 @@ TEST(SimCell, AMoveTakesTheSlowestAxisAndThenSettles) {
 TEST(SimCell, LimitsAreRefusedAtTheDevice) {
   ReadyCell ready;
   const std::string j3 = refusal([&] { ready.cell.robot.move_to({0, 0, .5, 0}, 0); });
-  EXPECT_EQ(j3, "the robot refuses j3 = 500.000 mm: its limits are -100.000 and 400.000");
+  EXPECT_EQ(j3, "the robot refuses to move j3 to 500 mm: its limits are -100 and 400");
   const std::string c = refusal([&] { ready.cell.table.move_to({0, -4}, 0); });
-  EXPECT_EQ(c, "the table refuses c = -229.183 degrees: its limits are -180.000 and 180.000");
+  EXPECT_EQ(c, "the table refuses to move c to -229.1831 degrees: its limits are -180 and 180");
   EXPECT_NE(refusal([&] { ready.cell.robot.move_to({std::nan(""), 0, 0, 0}, 0); }), "");
   EXPECT_NE(refusal([&] { ready.cell.robot.move_to({0, 0, 0, 0}, -1); }), "");
   EXPECT_NE(refusal([&] { ready.cell.robot.move_to({0, 0, 0, 0}, std::nan("")); }), "");

@@ -13,30 +13,30 @@ namespace hilbrush {
 namespace {
 
 TEST(DobotCodec, CommandsAreWrittenAsInTheManual) {
-  EXPECT_EQ(encode_dobot("EnableRobot"), "EnableRobot()");
-  EXPECT_EQ(encode_dobot("SpeedFactor", {80}), "SpeedFactor(80)");
-  EXPECT_EQ(encode_dobot("DOExecute", {1, 0}), "DOExecute(1,0)");
-  EXPECT_EQ(encode_dobot_joint_move({1.5, -90, 123.4567891, 0}), "JointMovJ(1.500000,-90.000000,123.456789,0.000000)");
-  const auto pulse = encode_dobot_pulse(2, 5);
+  EXPECT_EQ(dobot::encode("EnableRobot"), "EnableRobot()");
+  EXPECT_EQ(dobot::encode("SpeedFactor", {80}), "SpeedFactor(80)");
+  EXPECT_EQ(dobot::encode("DOExecute", {1, 0}), "DOExecute(1,0)");
+  EXPECT_EQ(dobot::encode_joint_move({1.5, -90, 123.4567891, 0}), "JointMovJ(1.500000,-90.000000,123.456789,0.000000)");
+  const auto pulse = dobot::encode_pulse(2, 5);
   EXPECT_EQ(pulse[0] + pulse[1] + pulse[2] + pulse[3], "DO(2,1)wait(5)DO(2,0)Sync()");
 }
 
 TEST(DobotCodec, RepliesAreTakenApart) {
-  auto reply = decode_dobot_reply("0,{5},RobotMode()");
+  auto reply = dobot::decode_reply("0,{5},RobotMode()");
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->error, 0);
   EXPECT_EQ(reply->values, "5");
   EXPECT_EQ(reply->command, "RobotMode()");
 
-  reply = decode_dobot_reply("-40001,{},DOExecute(99,0)");
+  reply = dobot::decode_reply("-40001,{},DOExecute(99,0)");
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->error, -40001);
-  EXPECT_NE(dobot_error_text(reply->error).find("parameter 1 is out of range"), std::string::npos);
-  EXPECT_NE(dobot_error_text(-30002).find("parameter 2 is of a wrong type"), std::string::npos);
-  EXPECT_NE(dobot_error_text(-10000).find("unknown"), std::string::npos);
-  EXPECT_NE(dobot_error_text(-20000).find("number of parameters"), std::string::npos);
+  EXPECT_NE(dobot::error_text(reply->error).find("parameter 1 is out of range"), std::string::npos);
+  EXPECT_NE(dobot::error_text(-30002).find("parameter 2 is of a wrong type"), std::string::npos);
+  EXPECT_NE(dobot::error_text(-10000).find("unknown"), std::string::npos);
+  EXPECT_NE(dobot::error_text(-20000).find("number of parameters"), std::string::npos);
 
-  reply = decode_dobot_reply("\n0,{[[17],[],[],[]]},GetErrorID() ");
+  reply = dobot::decode_reply("\n0,{[[17],[],[],[]]},GetErrorID() ");
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->values, "[[17],[],[],[]]");
 }
@@ -44,22 +44,22 @@ TEST(DobotCodec, RepliesAreTakenApart) {
 TEST(DobotCodec, WhatIsNoReplyIsRefused) {
   for (const char* text : {"", "0", "0,", "0,{}", "0,{},", "0,{},RobotMode", ",{},RobotMode()", "0,{,RobotMode()",
                            "0;{};RobotMode()", "ok", "0,}{,RobotMode()", "99999999999999999999999,{},A()", "0,{},()"})
-    EXPECT_FALSE(decode_dobot_reply(text)) << text;
+    EXPECT_FALSE(dobot::decode_reply(text)) << text;
 }
 
 TEST(DobotCodec, AnEchoIsRecognizedWithoutRegardToCase) {
-  EXPECT_TRUE(is_dobot_echo("jointmovj(1.0,2,3,4)", "JointMovJ(1.000000,2.000000,3.000000,4.000000)"));
-  EXPECT_TRUE(is_dobot_echo("Sync()", "Sync()"));
-  EXPECT_FALSE(is_dobot_echo("DO(1,0)", "Sync()"));
-  EXPECT_FALSE(is_dobot_echo("DO(1)", "DO(1,0)"));
-  EXPECT_FALSE(is_dobot_echo("SpeedFactor()", "SpeedFactor(5)"));
-  EXPECT_FALSE(is_dobot_echo("", "Sync()"));
+  EXPECT_TRUE(dobot::is_echo("jointmovj(1.0,2,3,4)", "JointMovJ(1.000000,2.000000,3.000000,4.000000)"));
+  EXPECT_TRUE(dobot::is_echo("Sync()", "Sync()"));
+  EXPECT_FALSE(dobot::is_echo("DO(1,0)", "Sync()"));
+  EXPECT_FALSE(dobot::is_echo("DO(1)", "DO(1,0)"));
+  EXPECT_FALSE(dobot::is_echo("SpeedFactor()", "SpeedFactor(5)"));
+  EXPECT_FALSE(dobot::is_echo("", "Sync()"));
 }
 
 std::string packet(std::uint64_t time_ms, double first_joint = 12.5) {
-  DobotFrame frame;
+  dobot::Frame frame;
   frame.digital_outputs = 0b101;
-  frame.mode = DobotMode::kEnabled;
+  frame.mode = dobot::Mode::kEnabled;
   frame.time_ms = time_ms;
   frame.setpoint[0] = first_joint;
   frame.actual[0] = first_joint + 1;
@@ -69,10 +69,10 @@ std::string packet(std::uint64_t time_ms, double first_joint = 12.5) {
 }
 
 TEST(DobotCodec, FramesAreReadAtTheirOffsets) {
-  const auto frame = decode_dobot_frame(packet(4711));
+  const auto frame = dobot::decode_frame(packet(4711));
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->digital_outputs, 0b101u);
-  EXPECT_EQ(frame->mode, DobotMode::kEnabled);
+  EXPECT_EQ(frame->mode, dobot::Mode::kEnabled);
   EXPECT_EQ(frame->time_ms, 4711u);
   EXPECT_EQ(frame->setpoint[0], 12.5);
   EXPECT_EQ(frame->actual[0], 13.5);
@@ -83,18 +83,18 @@ TEST(DobotCodec, FramesAreReadAtTheirOffsets) {
 }
 
 TEST(DobotCodec, FramesWithNonsenseInThemAreNone) {
-  EXPECT_FALSE(decode_dobot_frame(packet(1).substr(1)));
-  EXPECT_FALSE(decode_dobot_frame(packet(1) + "x"));
-  EXPECT_FALSE(decode_dobot_frame(packet(1, std::numeric_limits<double>::quiet_NaN())));
-  EXPECT_FALSE(decode_dobot_frame(packet(1, std::numeric_limits<double>::infinity())));
-  EXPECT_FALSE(decode_dobot_frame(packet(1, 1e300)));
+  EXPECT_FALSE(dobot::decode_frame(packet(1).substr(1)));
+  EXPECT_FALSE(dobot::decode_frame(packet(1) + "x"));
+  EXPECT_FALSE(dobot::decode_frame(packet(1, std::numeric_limits<double>::quiet_NaN())));
+  EXPECT_FALSE(dobot::decode_frame(packet(1, std::numeric_limits<double>::infinity())));
+  EXPECT_FALSE(dobot::decode_frame(packet(1, 1e300)));
   std::string bytes = packet(1);
   bytes[48] ^= 1;
-  EXPECT_FALSE(decode_dobot_frame(bytes));
+  EXPECT_FALSE(dobot::decode_frame(bytes));
 }
 
 TEST(DobotCodec, AStreamFindsItsPlaceAgain) {
-  DobotFrameStream stream;
+  dobot::FrameStream stream;
   const std::string half = packet(2).substr(0, 700);
   stream.push("rubbish" + packet(1) + half + packet(3));
   std::string rest = packet(4);
@@ -114,14 +114,14 @@ TEST(DobotCodec, AStreamFindsItsPlaceAgain) {
 }
 
 TEST(DobotCodec, ReplyStreamsAreCutAtTheirSemicolons) {
-  DobotReplyStream stream;
+  dobot::ReplyStream stream;
   stream.push("0,{},DO(1,1);0,{},wa");
   EXPECT_EQ(stream.next(), "0,{},DO(1,1)");
   EXPECT_EQ(stream.next(), std::nullopt);
   stream.push("it(5);");
   EXPECT_EQ(stream.next(), "0,{},wait(5)");
   EXPECT_TRUE(stream.is_empty());
-  stream.push(std::string(DobotReplyStream::kReplyMax + 1, 'x'));
+  stream.push(std::string(dobot::ReplyStream::kReplyMax + 1, 'x'));
   EXPECT_TRUE(stream.is_overlong());
 }
 

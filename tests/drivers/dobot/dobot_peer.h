@@ -13,8 +13,8 @@
 namespace hilbrush::test {
 
 /// A feedback packet as the manual's table of offsets has it.
-inline std::string dobot_packet(const DobotFrame& frame) {
-  std::string bytes(kDobotFrameBytes, '\0');
+inline std::string dobot_packet(const dobot::Frame& frame) {
+  std::string bytes(dobot::kFrameBytes, '\0');
   const auto put = [&](std::size_t at, const auto& value) { std::memcpy(bytes.data() + at, &value, sizeof value); };
   put(0, std::uint16_t{1440});
   put(16, frame.digital_outputs);
@@ -38,7 +38,7 @@ class DobotPeer {
   std::uint16_t feedback_port() const { return feedback_.port(); }
 
   /// To whoever listens to the feedback; waits until somebody does.
-  void show(const DobotFrame& frame) {
+  void show(const dobot::Frame& frame) {
     while (!feedback_.send(dobot_packet(frame))) std::this_thread::yield();
   }
   /// The queue has come to the Sync of a pulse.
@@ -72,7 +72,7 @@ class DobotPeer {
           const std::lock_guard lock(mutex_);
           commands_.push_back(command);
         }
-        const auto mode = std::to_string(static_cast<int>(DobotMode::kEnabled));
+        const auto mode = std::to_string(static_cast<int>(dobot::Mode::kEnabled));
         if (command != kept_) send("0,{" + mode + "}," + command + ";");
       }
     }

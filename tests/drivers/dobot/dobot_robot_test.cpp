@@ -30,7 +30,7 @@ DobotOptions options_of(const DobotPeer& peer) {
 class DobotFrames : public testing::Test {
  protected:
   DobotFrames() {
-    frame.mode = DobotMode::kEnabled;
+    frame.mode = dobot::Mode::kEnabled;
     frame.is_enabled = true;
     std::thread connecting([this] { robot.connect(); });
     while (robot.status().read_s <= 0) play();
@@ -45,7 +45,7 @@ class DobotFrames : public testing::Test {
   void play(bool is_running = false) {
     const double last_s = robot.status().read_s;
     frame.is_running = is_running;
-    frame.mode = is_running ? DobotMode::kRunning : DobotMode::kEnabled;
+    frame.mode = is_running ? dobot::Mode::kRunning : dobot::Mode::kEnabled;
     frame.time_ms += kFrameMs;
     peer.show(frame);
     while (robot.status().read_s <= last_s && robot.status().state != DeviceState::kFault) std::this_thread::yield();
@@ -77,7 +77,7 @@ class DobotFrames : public testing::Test {
   SteadyClock clock{50};  // slow: nothing here may wait for time to pass, nor be late on a busy machine
   DobotRobot robot{options_of(peer), clock};
   Gate& gate = robot.gate(kOutput);
-  DobotFrame frame;
+  dobot::Frame frame;
 };
 
 TEST_F(DobotFrames, SettlingIsCountedFromTheFirstThatShowsRest) {
