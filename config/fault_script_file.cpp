@@ -53,7 +53,7 @@ WireFault read_fault(JsonObject& json) {
     json.refuse("device", "has no alarm of its own: use interlock_open");
   if (is_of_exchange(fault.kind)) fault.messages = json.optional_integer("messages", 1, kCountMax).value_or(1);
   if (has_duration(fault.kind)) fault.duration_s = json.quantity("duration_ms", {0, kMaxS * 1e3});
-  if (has_axis(fault.kind)) fault.axis = static_cast<int>(json.choice("axis", names(kAxisNames)));
+  if (has_axis(fault.kind)) fault.axis = json.choice("axis", names(kAxisNames));
   if (fault.kind == WireFaultKind::kAxisDrift)
     fault.amount = json.quantity(fault.axis == kJ3 ? "speed_mm_s" : "speed_deg_s", {-1e5, 1e5});
   if (fault.kind == WireFaultKind::kPowerLimit) fault.amount = json.number("share", {0, 1});

@@ -58,7 +58,7 @@ struct WireFault {
   FaultTrigger trigger;
   std::uint64_t messages = 1;  ///< how many exchanges in a row it takes, if it is of an exchange
   double duration_s = .05;
-  int axis = 0;  ///< of j1, j2, j3, j4, a, c
+  std::size_t axis = 0;  ///< of j1, j2, j3, j4, a, c
   double amount = 0;
 };
 

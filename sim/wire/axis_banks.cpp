@@ -301,11 +301,14 @@ void Cia402Bank::control(std::uint16_t word) {
 std::uint16_t Cia402Bank::status() {
   const DriveAxis::Report report = drive_.report();
   if (drive_.alarm() != 0) state_ = State::kFault;
-  if (is_homing_ && report.is_in_position) is_homing_ = false, is_homed_ = true;
+  if (is_homing_ && report.is_in_position) {
+    is_homing_ = false;
+    is_homed_ = true;
+  }
   std::uint16_t word = bit(9) | bit(4);
   if (state_ == State::kFault) word |= bit(3);
   if (state_ == State::kSwitchOnDisabled) word |= bit(6);
-  if (state_ >= State::kReadyToSwitchOn) word |= bit(0) | bit(5);
+  if (state_ >= State::kReadyToSwitchOn) word |= static_cast<std::uint16_t>(bit(0) | bit(5));
   if (state_ >= State::kSwitchedOn) word |= bit(1);
   if (state_ == State::kOperationEnabled) word |= bit(2);
   if (report.is_in_position) word |= bit(10);

@@ -24,10 +24,10 @@ bool read_integer(const std::string& text, int& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-double to_wire(int axis, double value) {
+double to_wire(std::size_t axis, double value) {
   return axis == kJ3 ? value * 1e3 : value * 180 / std::numbers::pi;
 }
-double from_wire(int axis, double value) {
+double from_wire(std::size_t axis, double value) {
   return axis == kJ3 ? value * 1e-3 : value * std::numbers::pi / 180;
 }
 
@@ -101,8 +101,7 @@ std::string DobotController::dashboard(const std::string& name, const Arguments&
   if (name == "getangle" || name == "getpose") {
     frame();
     std::array<double, 4> values{};
-    for (int i = 0; i < 4; ++i)
-      values[static_cast<std::size_t>(i)] = to_wire(i, last_.positions[static_cast<std::size_t>(i)]);
+    for (std::size_t i = 0; i < 4; ++i) values[i] = to_wire(i, last_.positions[i]);
     return answered(kOk, listed(name == "getangle" ? values : pose_of(cell_.description().arm, last_.positions)));
   }
   if (name == "speedfactor") return set_ratio(arguments, speed_factor_);
@@ -149,21 +148,20 @@ std::string DobotController::set_ratio(const Arguments& arguments, double& ratio
 std::string DobotController::joint_move(const Arguments& arguments, bool is_pose) {
   if (arguments.size() < 4) return answered(kWrongCount);
   std::array<double, 4> target{};
-  for (int i = 0; i < 4; ++i)
-    if (!read_number(arguments[static_cast<std::size_t>(i)], target[static_cast<std::size_t>(i)]))
-      return answered(kWrongType - 1 - i);
+  for (std::size_t i = 0; i < 4; ++i)
+    if (!read_number(arguments[i], target[i])) return answered(kWrongType - 1 - static_cast<int>(i));
   if (is_pose) {
     const auto joints = joints_of(cell_.description().arm, target, cell_.target(kJ2));
     if (!joints) return answered(kFailed);
     target = *joints;
   } else {
-    for (int i = 0; i < 4; ++i) target[static_cast<std::size_t>(i)] = from_wire(i, target[static_cast<std::size_t>(i)]);
+    for (std::size_t i = 0; i < 4; ++i) target[i] = from_wire(i, target[i]);
   }
   constexpr double kRounding = 1e-7;  // the wire has six decimals
-  for (int i = 0; i < 4; ++i) {
-    const double value = target[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double value = target[i];
     if (value < cell_.limits(i).min - kRounding || value > cell_.limits(i).max + kRounding)
-      return answered(kOutOfRange - 1 - i);
+      return answered(kOutOfRange - 1 - static_cast<int>(i));
   }
   return accept(Move{target, speed_factor_ * joint_speed_});
 }
@@ -185,7 +183,7 @@ std::string DobotController::jog(const Arguments& arguments) {
   if (!is_enabled() || alarm_ != 0) return answered(kFailed);
   const std::string axis = arguments.empty() ? "" : arguments[0];
   if (axis.empty()) {
-    for (int i = 0; i < 4; ++i) cell_.brake_axis(i);
+    for (std::size_t i = 0; i < 4; ++i) cell_.brake_axis(i);
     is_jogging_ = false;
     return answered(kOk);
   }
@@ -193,7 +191,7 @@ std::string DobotController::jog(const Arguments& arguments) {
       (axis[2] != '+' && axis[2] != '-'))
     return answered(kWrongType - 1);
   if (!is_queue_done()) return answered(kFailed);
-  const int index = axis[1] - '1';
+  const auto index = static_cast<std::size_t>(axis[1] - '1');
   const AxisDescription& limits = cell_.limits(index);
   cell_.move_axis(index, axis[2] == '+' ? limits.max : limits.min, .1 * speed_factor_);
   is_jogging_ = true;
@@ -213,7 +211,7 @@ std::string DobotController::reset() {
   queue_.clear();
   current_.reset();
   is_jogging_ = false;
-  for (int i = 0; i < 4; ++i) cell_.brake_axis(i);
+  for (std::size_t i = 0; i < 4; ++i) cell_.brake_axis(i);
   return answered(kOk);
 }
 
@@ -224,7 +222,7 @@ void DobotController::raise_alarm(int id) {
 }
 
 bool DobotController::is_moving() const {
-  for (int i = 0; i < 4; ++i)
+  for (std::size_t i = 0; i < 4; ++i)
     if (cell_.is_moving(i)) return true;
   return false;
 }
@@ -248,7 +246,7 @@ void DobotController::begin(const Item& item) {
   current_end_s_ = cell_.now_s();
   if (const auto* move = std::get_if<Move>(&item)) {
     present();
-    for (int i = 0; i < 4; ++i) cell_.move_axis(i, move->target[static_cast<std::size_t>(i)], move->speed_scale);
+    for (std::size_t i = 0; i < 4; ++i) cell_.move_axis(i, move->target[i], move->speed_scale);
   } else if (const auto* wait = std::get_if<Wait>(&item)) {
     current_end_s_ += wait->duration_s;
     if (cell_.is_gate_open()) cell_.set_gate(true, wait->duration_s);
@@ -282,11 +280,10 @@ int DobotController::mode() const {
 DobotController::State DobotController::present() const {
   State state;
   state.mode = mode();
-  for (int i = 0; i < 4; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    state.positions[k] = cell_.position(i);
-    state.speeds[k] = cell_.speed(i);
-    state.targets[k] = cell_.target(i);
+  for (std::size_t i = 0; i < 4; ++i) {
+    state.positions[i] = cell_.position(i);
+    state.speeds[i] = cell_.speed(i);
+    state.targets[i] = cell_.target(i);
   }
   return state;
 }
@@ -299,8 +296,7 @@ void put(std::string& frame, std::size_t offset, Value value) {
 }
 
 void put_axes(std::string& frame, std::size_t offset, const std::array<double, 4>& values) {
-  for (int i = 0; i < 4; ++i)
-    put(frame, offset + 8 * static_cast<std::size_t>(i), to_wire(i, values[static_cast<std::size_t>(i)]));
+  for (std::size_t i = 0; i < 4; ++i) put(frame, offset + 8 * i, to_wire(i, values[i]));
 }
 
 }  // namespace
@@ -318,7 +314,7 @@ std::string DobotController::frame() {
     last_ = *stale_;
   }
   bool is_settled = last_.mode == 5;
-  for (int i = 0; i < 4; ++i) is_settled = is_settled && cell_.is_settled(i);
+  for (std::size_t i = 0; i < 4; ++i) is_settled = is_settled && cell_.is_settled(i);
   if (is_settled) times_.note_settled_shown(WireDevice::kRobot, cell_.now_s());
   if (!cell_.is_gate_open()) times_.note_dark_shown(cell_.now_s());
   std::string frame(kFrameBytes, '\0');

@@ -41,8 +41,8 @@ class WiredAxes : public testing::TestWithParam<WireOptions::Table> {
     for (std::size_t i = 0; i < 2; ++i) {
       EXPECT_NEAR(table->status().positions[i], target[i], 1e-5);
       cell.wire.act([&](TrueCell& truth) {
-        EXPECT_NEAR(truth.position(kTilt + static_cast<int>(i)), target[i], 1e-5);
-        EXPECT_TRUE(truth.is_settled(kTilt + static_cast<int>(i)));
+        EXPECT_NEAR(truth.position(kTilt + i), target[i], 1e-5);
+        EXPECT_TRUE(truth.is_settled(kTilt + i));
       });
     }
   }

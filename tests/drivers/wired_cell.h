@@ -48,7 +48,7 @@ class WiredCell {
     options.feedback_port = at.feedback_port;
     for (std::size_t i = 0; i < 4; ++i) {
       options.scales[i].steps_per_unit = i == kJ3 ? 1e3 : 180 / 3.14159265358979323846;
-      options.bounds[i] = bounds(static_cast<int>(i));
+      options.bounds[i] = bounds(i);
     }
     return options;
   }
@@ -59,7 +59,7 @@ class WiredCell {
       options[i].endpoint.tcp_port = wire.endpoints().table_tcp_port;
       options[i].unit = static_cast<int>(i) + 1;
       options[i].scale.steps_per_unit = wire.endpoints().steps_per_deg * 180 / 3.14159265358979323846;
-      options[i].bounds = bounds(kTilt + static_cast<int>(i));
+      options[i].bounds = bounds(kTilt + i);
       options[i].window = 5e-5;
     }
     return options;
@@ -112,8 +112,8 @@ class WiredCell {
   std::unique_ptr<GatedLaser> laser;
 
  private:
-  AxisBounds bounds(int axis) const {
-    const AxisDescription& limits = description.axes[static_cast<std::size_t>(axis)];
+  AxisBounds bounds(std::size_t axis) const {
+    const AxisDescription& limits = description.axes[axis];
     return {limits.min, limits.max, limits.speed_max, limits.acceleration_max};
   }
   std::mutex mutex_;
