@@ -7,15 +7,22 @@
 #include <vector>
 
 /// Places sorted into cubes, to find those around a place.
+///
+/// There are three such grids because their demands differ: this one holds a fixed set in single precision and keeps
+/// each cube's places side by side (what `fine` reads in its inner loop); DotGrid (sampling/gaps) takes in new dots
+/// between look-ups and searches to any distance; touching balls (sampling/blue) differ in size by orders of magnitude,
+/// so each octave of radius has its own side. They also visit places in different orders, and sums of floating-point
+/// numbers depend on that order.
 namespace hilbrush {
 
 class CubeGrid {
  public:
-  /// Cost O(n log n), same for any number of threads. Places half a million sides apart may share a cube.
+  /// Cost O(n log n); the same grid for any number of threads. Two million sides (2^21) apart cubes share a key, so
+  /// their places are visited together: callers compare distances.
   CubeGrid(std::span<const Eigen::Vector3f> places, float side_m);
 
   std::size_t cube_count() const { return cubes_.size(); }
-  /// Indices of the places in a cube, rising.
+  /// Indices of the places in a cube, in rising order.
   std::span<const std::uint32_t> in_cube(std::size_t cube) const {
     return {order_.data() + cubes_[cube].begin, cubes_[cube].end - cubes_[cube].begin};
   }

@@ -18,17 +18,21 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// Steps of a dot, in pitches: they shrink from the first length to the last, as half a wave.
-constexpr float kFirstStep = .5f, kLastStep = .03f;
-/// It takes so many passes to find out how steep it is; until then steps are shorter.
-constexpr int kWarmUp = 4;
-/// How long a dot remembers which way it went, and how steep it was.
-constexpr float kMomentum = .8f, kSteepness = .95f;
-/// Dots whose gradient is below this share of the common one hardly need to move.
+/// Length of a dot's step in the first and the last pass, in pitches; in between it falls along half a cosine wave.
+constexpr float kFirstStepPitches = .5f;
+constexpr float kLastStepPitches = .03f;
+/// Passes before the averages of the gradients can be trusted; until then steps are shorter.
+constexpr int kWarmUpPasses = 4;
+/// Weight of the old value in the running averages of a dot's gradient and of its square: beta1 and beta2 of Adam,
+/// shorter than its .9 and .999 because there are only a few dozen passes.
+constexpr float kMomentum = .8f;
+constexpr float kSteepness = .95f;
+/// Steps are divided by at least this share of the rms gradient of all dots, so that a dot whose own gradient is
+/// smaller hardly moves.
 constexpr float kCommonShare = .5f;
 
-/// Gradient descent with momentum, each dot's step scaled by how steep its own valley has been (Kingma and Ba, "Adam",
-/// 2015; one scale for all directions, so that no direction is preferred).
+/// Gradient descent with momentum, each dot's step divided by the running rms of its own gradient (Kingma and Ba,
+/// "Adam", 2015; one scale for all directions, so that no direction is preferred).
 class Descent {
  public:
   Descent(const SurfaceCurve& curve, const ToneField& tone, const DotSequence& dots, const SpotModel& spot)
@@ -55,18 +59,18 @@ class Descent {
     const auto common2 = static_cast<float>(square / static_cast<double>(places_.size()));
     if (!(common2 > 0)) return;
     const float done = static_cast<float>(pass) / static_cast<float>(passes);
-    const float length =
-        pitch_m_ * std::min(1.f, static_cast<float>(pass + 1) / kWarmUp) *
-        (kLastStep + (kFirstStep - kLastStep) * .5f * (1 + std::cos(std::numbers::pi_v<float> * done)));
-    // Both memories begin empty.
-    const float motion_share = 1 - std::pow(kMomentum, static_cast<float>(pass + 1)),
-                steepness_share = 1 - std::pow(kSteepness, static_cast<float>(pass + 1));
+    const float length = pitch_m_ * std::min(1.f, static_cast<float>(pass + 1) / kWarmUpPasses) *
+                         (kLastStepPitches + (kFirstStepPitches - kLastStepPitches) * .5f *
+                                                 (1 + std::cos(std::numbers::pi_v<float> * done)));
+    // Both averages start at 0; dividing by these shares removes that bias, as in Adam.
+    const float motion_share = 1 - std::pow(kMomentum, static_cast<float>(pass + 1));
+    const float steepness_share = 1 - std::pow(kSteepness, static_cast<float>(pass + 1));
     tbb::parallel_for(std::size_t{0}, places_.size(), [&](std::size_t i) {
       motion_[i] = kMomentum * motion_[i] + (1 - kMomentum) * gradients_[i];
       steepness_[i] = kSteepness * steepness_[i] + (1 - kSteepness) * gradients_[i].squaredNorm();
       const float steep = std::sqrt(steepness_[i] / steepness_share + kCommonShare * kCommonShare * common2);
-      const Vector3f way = -length / (motion_share * steep) * motion_[i];
-      if (!move_to(places_[i], curve_.surface(), tone_, places_[i].position_O + way.cast<double>()))
+      const Vector3f step = -length / (motion_share * steep) * motion_[i];
+      if (!move_to(places_[i], curve_.surface(), tone_, places_[i].position_O + step.cast<double>()))
         motion_[i].setZero();
       exposures_[i].place = paint_.place_of(places_[i].position_O);
       exposures_[i].normal = curve_.mesh().area_vector(places_[i].triangle).normalized().cast<float>();
@@ -102,7 +106,10 @@ DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSeq
   for (int pass = 0; pass < options.passes; ++pass) {
     descent.step(pass, options.passes);
     const double error = descent.paint();
-    if (error < best) best = error, best_places = descent.places();
+    if (error < best) {
+      best = error;
+      best_places = descent.places();
+    }
     progress(static_cast<double>(pass + 1) / options.passes);
   }
   tbb::parallel_for(std::size_t{0}, best_places.size(), [&](std::size_t i) {

@@ -18,10 +18,13 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kTexelPitches = .5;  ///< between texels of what is asked
-constexpr double kErrorPitches = 1;   ///< between places where the error is read: it is smooth over a pitch
-constexpr double kMaxCorrection = 1;  ///< of a wanted tone, in either direction
-/// The atlas repeats the mass of each triangle; beyond this it would only amplify rounding.
+/// Distance between texels of what is asked for, in pitches.
+constexpr double kTexelPitches = .5;
+/// Distance between the places where the error is measured, in pitches: it has been blurred by one pitch.
+constexpr double kErrorPitches = 1;
+/// Largest correction of a wanted tone, in either direction; tones are from 0 to 1.
+constexpr double kMaxCorrection = 1;
+/// Largest factor by which a triangle's texels are scaled to keep its mass; a larger one would only amplify rounding.
 constexpr double kMaxRescaling = 2;
 
 /// Visits the nodes of a triangle's rectangle whose box, `reach` steps to each side, meets the triangle.
@@ -39,7 +42,7 @@ void visit_nodes(const AtlasLayout& layout, std::uint32_t triangle, double reach
     }
 }
 
-/// The error of the picture, and how much each place is asked for otherwise because of it.
+/// How much the wanted tone is changed at each place, because of the errors measured so far.
 class Correction {
  public:
   Correction(const ToneField& asked, double pitch_m, double texel_limit)
@@ -56,8 +59,8 @@ class Correction {
 
   const std::vector<SurfacePoint>& points() const { return points_; }
 
-  /// Takes `share` of the error off; returns the error's root mean square.
-  double take_off(std::span<const float> painted, std::span<const float> wanted, double share) {
+  /// Subtracts `share` of the error; returns the error's root mean square.
+  double subtract(std::span<const float> painted, std::span<const float> wanted, double share) {
     CHECK_EQ(painted.size(), points_.size());
     CHECK_EQ(wanted.size(), points_.size());
     double square = 0;
@@ -90,7 +93,7 @@ class Correction {
   std::vector<std::size_t> texels_;  ///< of each point
 };
 
-/// The coverage asked for at first, texel by texel, and with a correction.
+/// The coverage originally asked for, texel by texel, and the same with a correction.
 class AskedTexels {
  public:
   AskedTexels(const ToneField& asked, const ToneCurve& curve, double pitch_m, double texel_limit)
@@ -123,8 +126,8 @@ class AskedTexels {
                       });
   }
 
-  /// Each texel is the mean over its box, so that a line thinner than a texel is not lost; a node that only frames the
-  /// triangle takes the mean of the strip next to it.
+  /// Each texel is the mean over its box, so that a line thinner than a texel is not lost; a node whose own box lies
+  /// outside of the triangle takes the mean over a box twice as wide.
   void bake() {
     texels_.assign(layout_.texel_count(), 0.f);
     visit_triangles([&](std::uint32_t t) {
@@ -138,7 +141,7 @@ class AskedTexels {
     });
   }
 
-  /// Rescales each triangle's texels so that between them the triangle asks for exactly as much as before.
+  /// Scales each triangle's texels so that the interpolated triangle asks for exactly as much as before.
   void keep_masses() {
     const ToneField baked(asked_, {layout_, ToneLayer(layout_.width(), layout_.height(), texels_)});
     visit_triangles([&](std::uint32_t t) {
@@ -158,13 +161,13 @@ class AskedTexels {
   std::vector<float> texels_;
 };
 
-/// The heaviest spot of what is asked for in a box of the triangle, by halving it towards its mass; none if the box is
+/// A point in a box of the triangle that asks for dots, by halving the box towards the larger mass; none if the box is
 /// blank.
 std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
                                            Vector2d low, Vector2d high) {
-  constexpr int kMaxSteps = 40;
+  constexpr int kMaxHalvings = 40;  // each side is halved 20 times: a millionth of the box
   ToneIntegral integral = asked.integrate(triangle, frame.clip_box(low, high).corners());
-  for (int halving = 0; halving < kMaxSteps && integral.mass > 0; ++halving) {
+  for (int halving = 0; halving < kMaxHalvings && integral.mass > 0; ++halving) {
     const Vector2d b = integral.first / integral.mass;
     const SurfacePoint center{triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
     if (asked.asked(center) > 0) return center;
@@ -180,7 +183,7 @@ std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const Triangl
   return std::nullopt;
 }
 
-/// Between texels the atlas is interpolated, so a dot may come to lie up to a texel outside what is asked for: it goes
+/// Between texels the atlas is interpolated, so a dot may lie up to a texel outside of what is asked for: it is moved
 /// back.
 void return_strays(DotSequence& dots, const ToneField& asked) {
   const TexturedMesh& mesh = asked.mesh();
@@ -221,7 +224,7 @@ DotSequence place_predictively(const ToneField& asked, const ToneField& density,
   const std::vector<float> wanted = predict.wanted(pitch_m, correction.points());
   for (int round = 0; round < options.rounds; ++round) {
     progress(static_cast<double>(round) / options.rounds);
-    const double rms = correction.take_off(predict.painted(dots, correction.points()), wanted, options.share);
+    const double rms = correction.subtract(predict.painted(dots, correction.points()), wanted, options.share);
     if (report) report->error_rms.push_back(rms);
     std::vector<float> tones = texels.corrected(correction);
     const ToneField corrected = field_of(asked, texels.layout(), tones);
