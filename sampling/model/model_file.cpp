@@ -21,13 +21,13 @@ bool starts_with(std::string_view text, std::string_view head) {
   return text.substr(0, head.size()) == head;
 }
 
-/// OFF's first word may carry letters for what the vertices have.
+/// OFF's first word may have letters before it for what the vertices have.
 bool is_off(std::string_view text) {
   const std::string_view word = text.substr(0, text.find_first_of(" \t\r\n#"));
   return word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF" || word == "STCOFF";
 }
 
-/// Kinds of model that are known but not read, by their first bytes or ending: what to say.
+/// The message for a kind of model that is known but not read, by its first bytes or ending; else empty.
 std::string refusal_of(std::string_view text, const std::string& ending) {
   if (starts_with(text, "glTF") || ending == ".glb" || ending == ".gltf")
     return "this is a glTF model, which is not read; convert it to VRML 2.0, OBJ, PLY, OFF or STL";
@@ -61,8 +61,8 @@ Model load_vrml(std::string text, const std::string& name, ModelFolder& folder, 
                 const ModelLimits& limits) {
   vrml::Reading reading(folder, read_image, limits);
   const vrml::Scene& scene = reading.parse_text(text, name);
-  std::string().swap(text);  // the tree holds all that matters
-  vrml::Place origin;
+  std::string().swap(text);  // the tree has copies
+  vrml::Context origin;
   origin.files.push_back(&scene);
   vrml::walk(reading, scene, origin);
   Model model;
@@ -73,8 +73,8 @@ Model load_vrml(std::string text, const std::string& name, ModelFolder& folder, 
   return model;
 }
 
-/// A mesh format that says nothing of color means no white object but any object: it is painted in the gray that
-/// viewers show it in. (VRML does say: a shape without a material is white.)
+/// A file of a mesh format without any color does not mean a white object: its color is unknown, and it is painted in
+/// the gray that viewers show it in. (VRML is explicit: a shape without a material is white.)
 void paint_in_default_gray(Model& model, const std::string& name) {
   constexpr double kGray = .8;  // sRGB-encoded, as the default material of VRML has it
   const auto is_silent = [](const Material& material) { return material.source == ColorSource::kNone; };

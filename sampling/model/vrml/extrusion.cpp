@@ -31,7 +31,8 @@ bool is_direction(const Vector3d& v) {
   return v.squaredNorm() > 1e-24;
 }
 
-/// What is not a direction takes the one before it, and the first ones the next one after them. False if none is.
+/// Replaces each zero vector by the direction before it, and those at the begin by the first direction. False if there
+/// is not a single direction.
 bool fill_gaps(std::vector<Vector3d>& directions) {
   const auto first = std::find_if(directions.begin(), directions.end(), is_direction);
   if (first == directions.end()) return false;
@@ -51,7 +52,8 @@ std::vector<Matrix3d> spine_frames(std::vector<Vector3d> spine) {
   if (!(extent > 0) || !std::isfinite(extent)) return std::vector<Matrix3d>(n, Matrix3d::Identity());
   for (Vector3d& p : spine) p /= extent;
 
-  std::vector<Vector3d> y(n), z(n, Vector3d::Zero());
+  std::vector<Vector3d> y(n);
+  std::vector<Vector3d> z(n, Vector3d::Zero());
   for (std::size_t i = 0; i < n; ++i) {
     const bool is_end = i == 0 || i == n - 1;
     const Vector3d& before = is_end && is_closed ? spine[n - 2] : spine[i == 0 ? 0 : i - 1];
@@ -90,11 +92,12 @@ std::vector<double> arc_fractions(const std::vector<Point>& points) {
   return fractions;
 }
 
-/// The closed cross-section as one polygon, with the texture cut out around its bounding square.
+/// The closed cross-section as one polygon; its bounding square is mapped onto the texture.
 void add_cap(FaceList& faces, const std::vector<Vector2d>& section, std::size_t first_point, bool is_begin) {
   const std::size_t n = section.size() > 1 && section.front() == section.back() ? section.size() - 1 : section.size();
   if (n < 3) return;
-  Vector2d low = section[0], high = section[0];
+  Vector2d low = section[0];
+  Vector2d high = section[0];
   for (const Vector2d& p : section) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
@@ -108,7 +111,8 @@ void add_cap(FaceList& faces, const std::vector<Vector2d>& section, std::size_t 
   faces.end_face();
 }
 
-/// Scale and orientation of spine point i: the last one given holds on.
+/// A point of the cross-section at spine point i, scaled and oriented. Beyond the end of `scale` or `orientation` the
+/// last entry holds.
 Vector3d on_section(const Vector2d& p, const std::vector<double>& scale, const std::vector<double>& orientation,
                     std::size_t i) {
   Vector2d s(1, 1);
@@ -138,13 +142,15 @@ FaceList extrusion(const Reference& node, const ModelLimits& limits) {
   FaceList faces;
   faces.at = at(*node.node);
   faces.is_reversed = !flag_of(node, "ccw", true);
-  const std::vector<double>&scale = numbers_of(node, "scale"), &orientation = numbers_of(node, "orientation");
+  const std::vector<double>& scale = numbers_of(node, "scale");
+  const std::vector<double>& orientation = numbers_of(node, "orientation");
   const std::vector<Matrix3d> frames = spine_frames(spine);
   for (std::size_t i = 0; i < spine.size(); ++i)
     for (const Vector2d& p : section)
       faces.points.push_back(spine[i] + frames[i] * on_section(p, scale, orientation, i));
 
-  const std::vector<double> s = arc_fractions(section), t = arc_fractions(spine);
+  const std::vector<double> s = arc_fractions(section);
+  const std::vector<double> t = arc_fractions(spine);
   const auto add_corner = [&](std::size_t i, std::size_t j) {
     faces.corners.push_back(static_cast<std::uint32_t>(i * section.size() + j));
     faces.corner_uv.emplace_back(s[j], t[i]);
@@ -157,8 +163,8 @@ FaceList extrusion(const Reference& node, const ModelLimits& limits) {
       add_corner(i + 1, j);
       faces.end_face();
     }
-  // The standard puts caps into a closed spine's tube as well. Neither eye nor beam gets there, and they would make it
-  // non-manifold.
+  // The standard puts caps into the tube of a closed spine as well. They can be neither seen nor hit by the beam, and
+  // would make the tube non-manifold.
   const bool is_ring = spine.size() > 2 && spine.front() == spine.back();
   if (!is_ring && flag_of(node, "beginCap", true)) add_cap(faces, section, 0, true);
   if (!is_ring && flag_of(node, "endCap", true)) add_cap(faces, section, (spine.size() - 1) * section.size(), false);

@@ -8,9 +8,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// The list's entry at an index that came from a file, or null.
+/// The list's item at an index that came from a file, or null.
 template <class T>
-const T* entry(const std::vector<T>& list, double index) {
+const T* item_at(const std::vector<T>& list, double index) {
   return index >= 0 && index < static_cast<double>(list.size()) ? &list[static_cast<std::size_t>(index)] : nullptr;
 }
 
@@ -20,23 +20,24 @@ std::vector<Vector2d> pairs_of(const std::vector<double>& numbers) {
   return pairs;
 }
 
-/// The faces of a coordIndex list, and where each corner and face stood in it.
+/// Which entry of the coordIndex list each corner is, and which of its faces each face.
 struct Outlines {
-  std::vector<std::size_t> place_of_corner;
+  std::vector<std::size_t> entry_of_corner;
   std::vector<std::size_t> number_of_face;
   std::size_t dropped = 0;
 };
 
 Outlines read_outlines(const std::vector<double>& coord_index, FaceList& faces) {
   Outlines outlines;
-  std::size_t face_number = 0, begin = 0;
+  std::size_t face_number = 0;
+  std::size_t begin = 0;
   bool is_good = true;
-  const auto end_face = [&](std::size_t place) {
-    if (place == begin) return;  // two ends in a row
+  const auto end_face = [&](std::size_t entry) {
+    if (entry == begin) return;  // two ends in a row
     if (is_good) {
-      for (std::size_t p = begin; p < place; ++p) {
+      for (std::size_t p = begin; p < entry; ++p) {
         faces.corners.push_back(static_cast<std::uint32_t>(coord_index[p]));
-        outlines.place_of_corner.push_back(p);
+        outlines.entry_of_corner.push_back(p);
       }
       faces.end_face();
       outlines.number_of_face.push_back(face_number);
@@ -45,12 +46,12 @@ Outlines read_outlines(const std::vector<double>& coord_index, FaceList& faces) 
     }
     ++face_number;
   };
-  for (std::size_t place = 0; place < coord_index.size(); ++place) {
-    if (coord_index[place] < 0) {
-      end_face(place);
-      begin = place + 1;
+  for (std::size_t entry = 0; entry < coord_index.size(); ++entry) {
+    if (coord_index[entry] < 0) {
+      end_face(entry);
+      begin = entry + 1;
       is_good = true;
-    } else if (!entry(faces.points, coord_index[place])) {
+    } else if (!item_at(faces.points, coord_index[entry])) {
       is_good = false;
     }
   }
@@ -64,8 +65,8 @@ void read_texture_coordinates(const Reference& node, const Reference& texture_co
   if (points.empty()) return;  // as exporters write what they do not use
   const CornerIndices index(numbers_of(node, "texCoordIndex"), numbers_of(node, "coordIndex"));
   std::size_t missing = 0;
-  for (const std::size_t place : outlines.place_of_corner) {
-    const Vector2d* uv = entry(points, index[place]);
+  for (const std::size_t entry : outlines.entry_of_corner) {
+    const Vector2d* uv = item_at(points, index[entry]);
     missing += uv == nullptr;
     faces.corner_uv.push_back(uv ? *uv : Vector2d(0, 0));
   }
@@ -89,7 +90,7 @@ void read_colors(const Reference& node, const Reference& colors, const Outlines&
   };
   if (flag_of(node, "colorPerVertex", true)) {
     const CornerIndices index(color_index, numbers_of(node, "coordIndex"));
-    for (const std::size_t place : outlines.place_of_corner) add(entry(luminances, index[place]));
+    for (const std::size_t entry : outlines.entry_of_corner) add(item_at(luminances, index[entry]));
   } else {
     std::vector<double> face_colors;  // some exporters end each entry with -1, as coordIndex does
     for (const double i : color_index)
@@ -97,8 +98,8 @@ void read_colors(const Reference& node, const Reference& colors, const Outlines&
     std::size_t corner = 0;
     for (std::size_t f = 0; f < faces.face_ends.size(); ++f) {
       const auto number = static_cast<double>(outlines.number_of_face[f]);
-      const double* named = color_index.empty() ? &number : entry(face_colors, number);
-      for (; corner < faces.face_ends[f]; ++corner) add(named ? entry(luminances, *named) : nullptr);
+      const double* named = color_index.empty() ? &number : item_at(face_colors, number);
+      for (; corner < faces.face_ends[f]; ++corner) add(named ? item_at(luminances, *named) : nullptr);
     }
   }
   if (missing > 0)

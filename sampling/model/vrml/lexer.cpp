@@ -72,7 +72,8 @@ void Lexer::read_token() {
     read_string();
   } else if (is_punctuation(c)) {
     token_.kind = TokenKind::kPunctuation;
-    token_.text = text_.substr(next_++, 1);
+    token_.text = text_.substr(next_, 1);
+    ++next_;
   } else if (is_digit(c) || ((c == '+' || c == '-' || c == '.') && (is_digit(second) || second == '.'))) {
     read_number();
   } else {

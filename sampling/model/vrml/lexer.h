@@ -26,7 +26,8 @@ class Lexer {
 
   const Token& peek() const { return token_; }
   /// Returns the current token and reads the next one.
-  /// @throws InputError "file:line" at a string without end or a number that is none or not finite.
+  /// @throws InputError "file:line" at a string without end, or at what begins like a number
+  /// and is not a finite one.
   Token take();
 
   const std::string& file() const { return file_; }

@@ -10,7 +10,7 @@
 namespace hilbrush::vrml {
 namespace {
 
-// A field and a string cost about as much memory as so many numbers.
+// A field and a string cost about as much memory as this many numbers.
 constexpr std::size_t kFieldCost = 24;
 constexpr std::size_t kStringCost = 8;
 constexpr std::size_t kParserWarningLimit = 100;
@@ -92,10 +92,16 @@ class Parser {
 
   NodePointer parse_statement(const std::string& expected) {
     const Token token = lexer_.peek();
-    if (token.is_word("PROTO")) return parse_prototype(), nullptr;
-    if (token.is_word("EXTERNPROTO")) return parse_external_prototype(), nullptr;
-    if (token.is_word("ROUTE")) return skip_route(), nullptr;
-    return parse_node(expected);
+    if (token.is_word("PROTO")) {
+      parse_prototype();
+    } else if (token.is_word("EXTERNPROTO")) {
+      parse_external_prototype();
+    } else if (token.is_word("ROUTE")) {
+      skip_route();
+    } else {
+      return parse_node(expected);
+    }
+    return nullptr;
   }
 
   void skip_route() {
@@ -125,7 +131,10 @@ class Parser {
       lexer_.take();
       name = take_name("a name after DEF");
     }
-    if (lexer_.peek().is_word("NULL")) return lexer_.take(), nullptr;
+    if (lexer_.peek().is_word("NULL")) {
+      lexer_.take();
+      return nullptr;
+    }
     return parse_body(std::string(lexer_.take().text), name, token.line);
   }
 
@@ -318,7 +327,7 @@ class Parser {
     }
     lexer_.take();
     scopes_.pop_back();
-    // Known only from here on, so that no PROTO can contain itself.
+    // Known only from here on, so that a PROTO cannot contain itself.
     scopes_.back().prototypes[prototype->name] = prototype;
   }
 

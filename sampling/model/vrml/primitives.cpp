@@ -50,7 +50,8 @@ void add_band(FaceList& faces, std::uint32_t lower, std::uint32_t upper, double 
 /// Triangles from a ring to one point above (or below) it.
 void add_fan(FaceList& faces, std::uint32_t ring, std::uint32_t tip, bool is_tip_above, double v_ring, double v_tip) {
   for (int i = 0; i < kSegments; ++i) {
-    const int from = is_tip_above ? i : i + 1, to = is_tip_above ? i + 1 : i;
+    const int from = is_tip_above ? i : i + 1;
+    const int to = is_tip_above ? i + 1 : i;
     add_corner(faces, on_ring(ring, from), {fraction(from), v_ring});
     add_corner(faces, on_ring(ring, to), {fraction(to), v_ring});
     add_corner(faces, tip, {fraction(i) + .5 / kSegments, v_tip});

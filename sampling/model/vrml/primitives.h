@@ -9,9 +9,11 @@ namespace hilbrush::vrml {
 
 constexpr int kSegments = 72;
 
-/// The parts of a cone or cylinder that are there.
+/// Which parts of a cone or cylinder there are.
 struct Parts {
-  bool side = true, top = true, bottom = true;
+  bool side = true;
+  bool top = true;
+  bool bottom = true;
 };
 
 FaceList box(const Eigen::Vector3d& size);

@@ -12,9 +12,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kWarningLimit = 200;
-constexpr std::size_t kUrlLimit = 16;         // tried of one list
-constexpr std::size_t kLookupLimit = 20'000;  // file look-ups of one model
-constexpr std::size_t kWorkPerTriangle = 16;
+constexpr std::size_t kUrlLimit = 16;         ///< tried of one list
+constexpr std::size_t kLookupLimit = 20'000;  ///< searches for files of one model
+constexpr std::size_t kWorkPerTriangle = 16;  ///< numbers that geometry may be made from, for each triangle allowed
 
 /// Geometry where a Shape must stand around it.
 bool is_bare_geometry(const std::string& type) {
@@ -23,7 +23,7 @@ bool is_bare_geometry(const std::string& type) {
   return types.count(type) > 0;
 }
 
-/// Nodes that belong to a scene but never to a surface; nobody misses them.
+/// Nodes that belong to a scene but never to a surface: not worth a warning.
 bool is_scenery(const std::string& type) {
   static const std::set<std::string> types{
       "Viewpoint", "NavigationInfo", "Background", "Fog", "Sound", "AudioClip", "MovieTexture", "WorldInfo", "Script",
@@ -62,7 +62,7 @@ void Reading::warn(const std::vector<std::string>& sentences) {
 }
 
 const Scene& Reading::parse_text(const std::string& text, const std::string& name) {
-  auto& scene = scenes_["\n" + name];  // no inline's path begins so
+  auto& scene = scenes_["\n" + name];  // not the path of any inlined file
   scene = std::make_unique<Scene>(parse(text, name, limits_, parse_budget_, warnings));
   return *scene;
 }
@@ -123,7 +123,7 @@ Result<int> Reading::add_image(const fs::path& file) {
 int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
   const auto [known, is_new] = pixel_textures_.try_emplace(image.data(), -1);
   if (!is_new) return known->second;
-  if (image.size() < 3 || image[0] < 1 || image[1] < 1) return -1;  // 0 0 0 is no texture
+  if (image.size() < 3 || image[0] < 1 || image[1] < 1) return -1;  // 0 0 0 means: no texture
   const double count = std::floor(image[0]) * std::floor(image[1]);
   if (image[2] < 1 || image[2] > 4 || count > static_cast<double>(image.size() - 3) ||
       count > static_cast<double>(limits_.image_pixels - pixel_count_)) {
@@ -199,30 +199,30 @@ TexturedMesh Reading::finish(const std::string& name) {
   return builder.finish(warnings);
 }
 
-void walk(Reading& reading, const Scene& scene, const Place& place) {
+void walk(Reading& reading, const Scene& scene, const Context& context) {
   if (scene.version == 1)
-    walk_vrml1(reading, scene, place);
+    walk_vrml1(reading, scene, context);
   else
-    walk_vrml2(reading, scene, place);
+    walk_vrml2(reading, scene, context);
 }
 
-Place deeper(const Reading& reading, const Place& place, const Node& node) {
-  if (place.depth >= reading.limits().depth)
+Context deeper(const Reading& reading, const Context& context, const Node& node) {
+  if (context.depth >= reading.limits().depth)
     throw InputError(at(node), "with PROTO and Inline expanded, nodes are nested more than " +
                                    std::to_string(reading.limits().depth) + " deep");
-  Place inner = place;
+  Context inner = context;
   ++inner.depth;
   return inner;
 }
 
-void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Place& place) {
+void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Context& context) {
   const Scene* scene = reading.open_inline(node, urls);
   if (!scene) return;
-  if (std::find(place.files.begin(), place.files.end(), scene) != place.files.end()) {
+  if (std::find(context.files.begin(), context.files.end(), scene) != context.files.end()) {
     reading.warn(node, "the inlined file contains itself; this one is left out");
     return;
   }
-  Place inside = deeper(reading, place, node);
+  Context inside = deeper(reading, context, node);
   inside.files.push_back(scene);
   walk(reading, *scene, inside);
 }

@@ -13,8 +13,8 @@
 
 namespace hilbrush::vrml {
 
-/// What one model's reading has in hand while the walks over its files' trees make the mesh: limits, files, images, the
-/// mesh so far.
+/// The state of reading one model while the walks over its files' trees make the mesh: limits, files, images, the mesh
+/// so far.
 class Reading {
  public:
   Reading(ModelFolder& folder, const ImageReader& read_image, const ModelLimits& limits)
@@ -40,14 +40,15 @@ class Reading {
   /// @throws InputError if the limit of nodes is exceeded.
   Reference resolve(Reference reference);
 
-  /// Counts the numbers that a node's geometry is made from, so that many USEs of a large one end. @throws InputError.
+  /// Counts the numbers that a node's geometry is made from, so that many USEs of a large node reach a limit.
+  /// @throws InputError.
   void spend(std::size_t numbers, const Node& node);
 
-  /// Notes a node that makes no surface; the first place of each type is reported.
+  /// Notes a node that makes no surface; the first line of each type is reported.
   void ignore(const Node& node);
 
   void warn(const Node& node, const std::string& sentence);
-  /// Adds warnings that say where they are from themselves; each is said once.
+  /// Adds warnings that name their file and line themselves; equal ones are added once.
   void warn(const std::vector<std::string>& sentences);
 
   /// Ends the reading: notes on what was ignored, then all warnings. @throws InputError at `name` if no surface was
@@ -73,7 +74,11 @@ class Reading {
   ModelFolder& folder_;
   const ImageReader& read_image_;
   ParseBudget parse_budget_;
-  std::size_t node_count_ = 0, work_ = 0, pixel_count_ = 0, missing_inline_count_ = 0, lookup_count_ = 0;
+  std::size_t node_count_ = 0;
+  std::size_t work_ = 0;  ///< numbers that geometry was made from
+  std::size_t pixel_count_ = 0;
+  std::size_t missing_inline_count_ = 0;
+  std::size_t lookup_count_ = 0;
   std::deque<Frame> frames_;
   std::map<std::string, std::unique_ptr<Scene>> scenes_;                         // by file
   std::map<std::string, Result<int>> images_;                                    // by file: the texture's index
@@ -83,23 +88,23 @@ class Reading {
   std::map<std::string, Ignored> ignored_;
 };
 
-/// Where a shape stands and how deep the walk is.
-struct Place {
-  Eigen::Affine3d X = Eigen::Affine3d::Identity();
+/// Around a node of the walk: the transforms and files that it stands in.
+struct Context {
+  Eigen::Affine3d X = Eigen::Affine3d::Identity();  ///< from the node's frame to the model's
   int depth = 0;
   std::vector<const Scene*> files;  ///< being walked; one that contains itself is skipped
 };
 
 /// Adds all shapes of a VRML 2.0 or 1.0 tree to the reading's mesh.
-void walk(Reading& reading, const Scene& scene, const Place& place);
-void walk_vrml2(Reading& reading, const Scene& scene, const Place& place);
-void walk_vrml1(Reading& reading, const Scene& scene, const Place& place);
+void walk(Reading& reading, const Scene& scene, const Context& context);
+void walk_vrml2(Reading& reading, const Scene& scene, const Context& context);
+void walk_vrml1(Reading& reading, const Scene& scene, const Context& context);
 
 /// One level deeper. @throws InputError at `node` if that exceeds the limit.
-Place deeper(const Reading& reading, const Place& place, const Node& node);
+Context deeper(const Reading& reading, const Context& context, const Node& node);
 
-/// The Inline or WWWInline `node`: its file's shapes, at `place`.
-void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Place& place);
+/// The Inline or WWWInline `node`: its file's shapes, in `context`.
+void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Context& context);
 
 /// Matrix of a Transform node, of either version (VRML97, 6.52).
 Eigen::Affine3d transform_of(const Reference& node, const char* scale_field);

@@ -7,14 +7,14 @@
 #include <vector>
 
 /// The node tree of one VRML file as it was written: any node, any field, nothing interpreted. DEF/USE share nodes;
-/// PROTOs are kept as templates and bound when the tree is walked (see walk.h), so a small file stays small in memory
-/// whatever it expands to.
+/// PROTOs are kept as templates and bound when the tree is walked (see binding.h), so a small file stays small in
+/// memory whatever it expands to.
 namespace hilbrush::vrml {
 
 struct Node;
 using NodePointer = std::shared_ptr<const Node>;
 
-/// What stands behind a field's name. A field knows its type only by use: numbers also hold booleans (0, 1).
+/// The value of a field. Its type follows only from its use: numbers also hold booleans (0, 1).
 struct Value {
   std::vector<double> numbers;
   std::vector<std::string> strings;  ///< and, in VRML 1.0, enumeration words

@@ -9,7 +9,9 @@ namespace hilbrush::vrml {
 
 /// The nodes a surface refers to.
 struct SurfaceParts {
-  Reference coordinates, colors, texture_coordinates;
+  Reference coordinates;
+  Reference colors;
+  Reference texture_coordinates;
 };
 
 /// IndexedFaceSet (6.23). Faces that use a point that does not exist are dropped with a warning; colors and texture
@@ -34,8 +36,10 @@ class CornerIndices {
  public:
   CornerIndices(const std::vector<double>& indices, const std::vector<double>& fallback)
       : indices_(indices.empty() ? fallback : indices) {}
-  /// The entry at the place of the coordIndex list, or -1 if there is none.
-  double operator[](std::size_t place) const { return place < indices_.size() ? indices_[place] : -1; }
+  /// The entry that belongs to an entry of the coordIndex list, or -1 if there is none.
+  double operator[](std::size_t coord_entry) const {
+    return coord_entry < indices_.size() ? indices_[coord_entry] : -1;
+  }
 
  private:
   const std::vector<double>& indices_;

@@ -6,8 +6,8 @@
 #include "sampling/model/vrml/reading.h"
 #include "sampling/model/vrml/surfaces.h"
 
-/// The walk over a VRML 1.0 tree. Properties are not fields of shapes here: they change a state that the shapes after
-/// them use, until the Separator around them ends.
+/// The walk over a VRML 1.0 tree. Properties are nodes here, not fields of shapes: they change a state that later
+/// shapes use, until the enclosing Separator ends.
 namespace hilbrush::vrml {
 namespace {
 
@@ -15,11 +15,14 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 struct State {
-  Place place;
-  Reference coordinates, texture_coordinates, material;
+  Context context;
+  Reference coordinates;
+  Reference texture_coordinates;
+  Reference material;
   std::string material_binding = "OVERALL";
   int texture = -1;
-  bool repeat_u = true, repeat_v = true;
+  bool repeat_u = true;
+  bool repeat_v = true;
   Eigen::Affine2d X_uv = Eigen::Affine2d::Identity();
   bool is_clockwise = false;
 };
@@ -70,8 +73,8 @@ class Vrml1Walker {
     if (set_transform(node, state) || set_property(node, state)) return;
     if (type == "WWWInline") {
       const BoundValue name = find(node, "name");
-      const Place place = deeper(reading_, state.place, *node.node);
-      walk_inline(reading_, *node.node, name ? name.value->strings : std::vector<std::string>(), place);
+      const Context context = deeper(reading_, state.context, *node.node);
+      walk_inline(reading_, *node.node, name ? name.value->strings : std::vector<std::string>(), context);
       return;
     }
     add_shape(node, state);
@@ -81,7 +84,7 @@ class Vrml1Walker {
   void walk_group(const Reference& node, State& state) {
     const std::string& type = node.node->type;
     State inner = state;
-    inner.place = deeper(reading_, state.place, *node.node);
+    inner.context = deeper(reading_, state.context, *node.node);
     const std::vector<NodePointer>& children = node.node->children;
     if (type == "Switch" || type == "LOD") {
       const double which = type == "LOD" ? 0 : number_of(node, "whichChild", -1);
@@ -92,16 +95,15 @@ class Vrml1Walker {
       for (const NodePointer& child : children) walk_node({child.get(), node.frame}, inner);
     }
     // What a Group or Switch sets stays set; a TransformSeparator holds back only the transform.
-    const Place place = state.place;
     if (type == "Separator" || type == "LOD" || type == "WWWAnchor") return;
-    if (type != "TransformSeparator") state.place.X = inner.place.X;
-    inner.place = state.place;
+    if (type != "TransformSeparator") state.context.X = inner.context.X;
+    inner.context = state.context;
     state = inner;
   }
 
   bool set_transform(const Reference& node, State& state) {
     const std::string& type = node.node->type;
-    Eigen::Affine3d& X = state.place.X;
+    Eigen::Affine3d& X = state.context.X;
     if (type == "Translation")
       X = X * Eigen::Translation3d(vector3_of(node, "translation", Vector3d::Zero()));
     else if (type == "Rotation")
@@ -185,52 +187,48 @@ class Vrml1Walker {
     else
       return reading_.ignore(*node.node);
     faces.at = at(*node.node);
-    if (!faces.face_ends.empty()) reading_.builder.add(faces, state.place.X, look);
+    if (!faces.face_ends.empty()) reading_.builder.add(faces, state.context.X, look);
   }
 
-  /// A VRML 2.0 face set of the same numbers: only where they stand and how colors are bound differ.
+  static void add_field(Node& node, const char* name, std::vector<double> numbers) {
+    Field field;
+    field.name = name;
+    field.value.numbers = std::move(numbers);
+    node.fields.push_back(std::move(field));
+  }
+
+  /// Adds the fields that bind the material's colors to `surface`, and the colors to `colors`; without a binding
+  /// neither.
+  static void bind_colors(const Reference& node, const State& state, Node& surface, Node& colors) {
+    const std::string& binding = state.material_binding;
+    const bool is_per_vertex = binding.starts_with("PER_VERTEX");
+    const bool is_per_face = binding.starts_with("PER_FACE") || binding.starts_with("PER_PART");
+    const bool is_indexed = binding.size() > 8 && binding.ends_with("_INDEXED");
+    if (!state.material || !(is_per_vertex || is_per_face)) return;
+    add_field(colors, "color", numbers_of(state.material, "diffuseColor"));
+    add_field(surface, "colorPerVertex", {is_per_vertex ? 1. : 0.});
+    if (is_indexed)
+      add_field(surface, "colorIndex", numbers_of(node, "materialIndex"));
+    else if (is_per_vertex)
+      add_field(surface, "colorIndex", running_index(numbers_of(node, "coordIndex")));
+  }
+
+  /// As a VRML 2.0 face set of the same numbers: only their fields and the binding of colors differ.
   FaceList face_set(const Reference& node, const State& state) {
     reading_.spend(numbers_of(node, "coordIndex").size(), *node.node);
     if (state.coordinates) reading_.spend(numbers_of(state.coordinates, "point").size(), *node.node);
-    std::vector<std::string> warnings;
-    const std::string& binding = state.material_binding;
-    const bool is_per_vertex = binding.find("PER_VERTEX") == 0;
-    const bool is_per_face = binding.find("PER_FACE") == 0 || binding.find("PER_PART") == 0;
-    const bool is_indexed = binding.size() > 8 && binding.compare(binding.size() - 8, 8, "_INDEXED") == 0;
-
     Node surface;
     surface.type = node.node->type;
     surface.file = node.node->file;
     surface.line = node.node->line;
-    const auto copy = [&](const char* from, const char* to) {
-      Field field;
-      field.name = to;
-      field.value.numbers = numbers_of(node, from);
-      surface.fields.push_back(std::move(field));
-    };
-    const auto set = [&](const char* name, std::vector<double> numbers) {
-      Field field;
-      field.name = name;
-      field.value.numbers = std::move(numbers);
-      surface.fields.push_back(std::move(field));
-    };
-    copy("coordIndex", "coordIndex");
-    copy("textureCoordIndex", "texCoordIndex");
-    set("ccw", {state.is_clockwise ? 0. : 1.});
-    SurfaceParts parts{state.coordinates, {}, state.texture_coordinates};
+    add_field(surface, "coordIndex", numbers_of(node, "coordIndex"));
+    add_field(surface, "texCoordIndex", numbers_of(node, "textureCoordIndex"));
+    add_field(surface, "ccw", {state.is_clockwise ? 0. : 1.});
     Node colors;
-    if (state.material && (is_per_vertex || is_per_face)) {
-      Field field;
-      field.name = "color";
-      field.value.numbers = numbers_of(state.material, "diffuseColor");
-      colors.fields.push_back(std::move(field));
-      if (colors.fields[0].value.numbers.size() > 3) parts.colors = {&colors, nullptr};
-      set("colorPerVertex", {is_per_vertex ? 1. : 0.});
-      if (is_indexed)
-        copy("materialIndex", "colorIndex");
-      else if (is_per_vertex)
-        set("colorIndex", running_index(numbers_of(node, "coordIndex")));
-    }
+    bind_colors(node, state, surface, colors);
+    SurfaceParts parts{state.coordinates, {}, state.texture_coordinates};
+    if (!colors.fields.empty() && colors.fields[0].value.numbers.size() > 3) parts.colors = {&colors, nullptr};
+    std::vector<std::string> warnings;
     FaceList faces = indexed_face_set({&surface, nullptr}, parts, look_of(state).luminance, warnings);
     reading_.warn(warnings);
     return faces;
@@ -249,10 +247,10 @@ class Vrml1Walker {
 
 }  // namespace
 
-void walk_vrml1(Reading& reading, const Scene& scene, const Place& place) {
+void walk_vrml1(Reading& reading, const Scene& scene, const Context& context) {
   Vrml1Walker walker(reading);
   State state;
-  state.place = place;
+  state.context = context;
   for (const NodePointer& root : scene.roots) walker.walk_node({root.get(), nullptr}, state);
 }
 

@@ -26,41 +26,41 @@ class Vrml2Walker {
  public:
   explicit Vrml2Walker(Reading& reading) : reading_(reading) {}
 
-  void walk_node(const Reference& start, const Place& outer) {
+  void walk_node(const Reference& start, const Context& outer) {
     const Reference node = reading_.resolve(start);
     if (!node) return;
     const std::string& type = node.node->type;
     if (type == "Shape") return add_shape(node, outer);
-    const Place place = deeper(reading_, outer, *node.node);
+    const Context context = deeper(reading_, outer, *node.node);
     if (type == "Transform") {
-      Place moved = place;
-      moved.X = place.X * transform_of(node, "scale");
+      Context moved = context;
+      moved.X = context.X * transform_of(node, "scale");
       walk_children(node, "children", moved);
     } else if (type == "Group" || type == "Anchor" || type == "Billboard" || type == "Collision") {
-      walk_children(node, "children", place);
+      walk_children(node, "children", context);
     } else if (type == "Switch") {
-      walk_choice(node, "choice", number_of(node, "whichChoice", -1), place);
+      walk_choice(node, "choice", number_of(node, "whichChoice", -1), context);
     } else if (type == "LOD") {
-      walk_choice(node, "level", 0, place);  // the finest
+      walk_choice(node, "level", 0, context);  // the finest
     } else if (type == "Inline") {
       const BoundValue url = find(node, "url");
-      walk_inline(reading_, *node.node, url ? url.value->strings : std::vector<std::string>(), place);
+      walk_inline(reading_, *node.node, url ? url.value->strings : std::vector<std::string>(), context);
     } else {
       reading_.ignore(*node.node);
     }
   }
 
  private:
-  void walk_children(const Reference& node, const char* field, const Place& place) {
+  void walk_children(const Reference& node, const char* field, const Context& context) {
     if (const BoundValue children = find(node, field))
-      for (const NodePointer& child : children.value->nodes) walk_node({child.get(), children.frame}, place);
-    for (const NodePointer& child : node.node->children) walk_node({child.get(), node.frame}, place);
+      for (const NodePointer& child : children.value->nodes) walk_node({child.get(), children.frame}, context);
+    for (const NodePointer& child : node.node->children) walk_node({child.get(), node.frame}, context);
   }
 
-  void walk_choice(const Reference& node, const char* field, double choice, const Place& place) {
+  void walk_choice(const Reference& node, const char* field, double choice, const Context& context) {
     const BoundValue choices = find(node, field);
     if (!choices || choice < 0 || choice >= static_cast<double>(choices.value->nodes.size())) return;
-    walk_node({choices.value->nodes[static_cast<std::size_t>(choice)].get(), choices.frame}, place);
+    walk_node({choices.value->nodes[static_cast<std::size_t>(choice)].get(), choices.frame}, context);
   }
 
   Reference resolved_field(const Reference& node, const char* field) { return reading_.resolve(node_of(node, field)); }
@@ -99,13 +99,13 @@ class Vrml2Walker {
       look.opacity = 1;
   }
 
-  void add_shape(const Reference& shape, const Place& place) {
+  void add_shape(const Reference& shape, const Context& context) {
     const Reference geometry = resolved_field(shape, "geometry");
     if (!geometry) return;
     const Look look = look_of(shape);
     FaceList faces = faces_of(geometry, look.luminance);
     if (faces.at.empty()) faces.at = at(*geometry.node);
-    if (!faces.face_ends.empty()) reading_.builder.add(faces, place.X, look);
+    if (!faces.face_ends.empty()) reading_.builder.add(faces, context.X, look);
   }
 
   FaceList faces_of(const Reference& node, float luminance) {
@@ -140,9 +140,9 @@ class Vrml2Walker {
 
 }  // namespace
 
-void walk_vrml2(Reading& reading, const Scene& scene, const Place& place) {
+void walk_vrml2(Reading& reading, const Scene& scene, const Context& context) {
   Vrml2Walker walker(reading);
-  for (const NodePointer& root : scene.roots) walker.walk_node({root.get(), nullptr}, place);
+  for (const NodePointer& root : scene.roots) walker.walk_node({root.get(), nullptr}, context);
 }
 
 }  // namespace hilbrush::vrml
