@@ -12,7 +12,8 @@ struct SurfacePlace {
   std::uint32_t component = 0;
 };
 
-/// The surface point of a triangle at a position in its plane.
+/// The surface point of a triangle at a position in its plane. foot_of_perpendicular() finds the same, but rounds
+/// differently: dots depend on the last bits of both, so both stay.
 inline SurfacePoint surface_point_at(const TexturedMesh& mesh, std::uint32_t triangle,
                                      const Eigen::Vector3d& position_O) {
   const Eigen::Vector3d &a = mesh.corner(triangle, 0), &b = mesh.corner(triangle, 1), &c = mesh.corner(triangle, 2);

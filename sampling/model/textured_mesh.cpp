@@ -17,13 +17,14 @@ Eigen::Vector3d position(const TexturedMesh& mesh, const SurfacePoint& point) {
   return p;
 }
 
-SurfacePoint surface_point(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O) {
+SurfacePoint foot_of_perpendicular(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O) {
   const Eigen::Vector3d area = mesh.area_vector(triangle);
   const auto share = [&](int c) {
     const Eigen::Vector3d& from = mesh.corner(triangle, (c + 1) % 3);
     return .5 * (mesh.corner(triangle, (c + 2) % 3) - from).cross(p_O - from).dot(area) / area.squaredNorm();
   };
-  const double u = share(0), v = share(1);
+  const double u = share(0);
+  const double v = share(1);
   return {triangle, {u, v, 1 - u - v}};
 }
 

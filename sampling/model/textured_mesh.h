@@ -6,15 +6,16 @@
 #include <string>
 #include <vector>
 
-/// The first noun of the pipeline: a triangle mesh whose surface points know their color.
-/// Plain data. Readers make it, place_on_table() moves it into the object frame O, repair_mesh() cleans it; nothing
-/// edits it later.
+/// A triangle mesh with a color at every point of its surface: what the pipeline starts from.
+/// Plain data. Readers make it, place_on_table() moves it into the object frame O, repair_mesh() cleans it; it is not
+/// changed later.
 namespace hilbrush {
 
-/// A picture as painting sees it. Row 0 is the bottom row: texel (i, j) has its center at u = (i + .5)/width, v = (j +
+/// A picture as painting needs it. Row 0 is the bottom row: texel (i, j) has its center at u = (i + .5)/width, v = (j +
 /// .5)/height.
 struct Texture {
-  int width = 0, height = 0;
+  int width = 0;
+  int height = 0;
   int channels = 3;  ///< of the image: with 1 or 2 it multiplies the surface's color, with 3 or 4 it replaces it
   std::vector<float> luminance;  ///< linear light, 0..1, width * height
   std::vector<float> opacity;    ///< 0..1, width * height, or empty: opaque
@@ -34,7 +35,8 @@ struct Material {
   std::string name;
   ColorSource source = ColorSource::kNone;
   int texture = -1;  ///< index into TexturedMesh::textures, or -1
-  bool repeat_u = true, repeat_v = true;
+  bool repeat_u = true;
+  bool repeat_v = true;
   double opacity = 1;  ///< 0..1; fully transparent surface gets no dots
 };
 
@@ -60,7 +62,7 @@ struct TexturedMesh {
   double area_m2() const;
 };
 
-/// A place on the surface; the one way to say "here" to every query.
+/// A point on the surface: what all queries take.
 struct SurfacePoint {
   std::uint32_t triangle = 0;
   Eigen::Vector3d barycentric = Eigen::Vector3d::Constant(1. / 3);  ///< sums to 1
@@ -69,7 +71,7 @@ struct SurfacePoint {
 /// Position of `point` in the mesh's frame.
 Eigen::Vector3d position(const TexturedMesh& mesh, const SurfacePoint& point);
 /// The point of `triangle` at the foot of the perpendicular from `p_O`.
-SurfacePoint surface_point(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O);
+SurfacePoint foot_of_perpendicular(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O);
 /// Unit normal of the point's triangle.
 Eigen::Vector3d face_normal(const TexturedMesh& mesh, const SurfacePoint& point);
 /// Axis-aligned bounds of the vertices that triangles use: {minimum, maximum}.

@@ -189,7 +189,7 @@ void return_strays(DotSequence& dots, const ToneField& asked) {
   const TexturedMesh& mesh = asked.mesh();
   tbb::parallel_for(std::size_t{0}, dots.dots.size(), [&](std::size_t i) {
     Dot& dot = dots.dots[i];
-    const SurfacePoint point = surface_point(mesh, dot.triangle, dot.position_O);
+    const SurfacePoint point = foot_of_perpendicular(mesh, dot.triangle, dot.position_O);
     if (asked.asked(point) > 0) return;
     const TriangleFrame frame(mesh, dot.triangle);
     const Vector2d place = frame.place(point.barycentric);

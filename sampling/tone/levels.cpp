@@ -19,7 +19,7 @@ constexpr double kRamp = 1e-5;
 /// Energy a dot here stands for: coverage asked over dots placed, within half a pitch and the dot's triangle.
 double local_energy(const Dot& dot, double pitch_m, const ToneField& asked, const ToneField& density) {
   const TriangleFrame frame(asked.mesh(), dot.triangle);
-  const Eigen::Vector2d center = frame.place(surface_point(asked.mesh(), dot.triangle, dot.position_O).barycentric),
+  const Eigen::Vector2d center = frame.place(foot_of_perpendicular(asked.mesh(), dot.triangle, dot.position_O).barycentric),
                         half = Eigen::Vector2d::Constant(pitch_m / 2);
   const BoxedPolygon around = frame.clip_box(center - half, center + half);
   const double dots = density.integrate(dot.triangle, around.corners()).mass;

@@ -64,7 +64,7 @@ void expose_dots(Film& film, const DotSequence& dots) {
   std::vector<float> levels;
   points.reserve(dots.dots.size()), levels.reserve(dots.dots.size());
   for (const Dot& dot : dots.dots) {
-    points.push_back(surface_point(film.mesh(), dot.triangle, dot.position_O));
+    points.push_back(foot_of_perpendicular(film.mesh(), dot.triangle, dot.position_O));
     levels.push_back(dot.level);
   }
   film.expose_at(points, levels);

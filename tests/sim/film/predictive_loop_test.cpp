@@ -86,7 +86,7 @@ TEST_F(PredictiveLoop, IsTheSameForAnyNumberOfThreads) {
 
 TEST_F(PredictiveLoop, LeavesTransparentSurfaceWithoutDots) {
   for (const Dot& dot : place(2).dots)
-    EXPECT_GT(tone_->asked(surface_point(mesh_, dot.triangle, dot.position_O)), 0) << dot.position_O.transpose();
+    EXPECT_GT(tone_->asked(foot_of_perpendicular(mesh_, dot.triangle, dot.position_O)), 0) << dot.position_O.transpose();
 }
 
 TEST_F(PredictiveLoop, KeepsAGivenNumberOfDots) {
