@@ -3,7 +3,8 @@
 #include <string>
 
 /// Broken invariants. CHECK is always on; its handler is called with the message and must not return (the daemon's
-/// turns the beam off first). Anything a file or a person can cause is an InputError instead, see input_error.h.
+/// turns the beam off first). What a file, a setting or a request can cause is an InputError instead, see
+/// input_error.h.
 namespace hilbrush {
 
 using CheckHandler = void (*)(const std::string& message);

@@ -5,8 +5,9 @@
 
 namespace hilbrush {
 
-/// A file, setting or request that can't be used. `at()` says where: "cup.wrl:12" or a JSON path such as
-/// "$.axes.j1.max_deg"; what() is "at: sentence". Caught once, at the boundary of a job or a request.
+/// A file, setting or request that cannot be used. `at()` says where: "cup.wrl:12" or a JSON path such as
+/// "$.axes.j1.max_deg"; what() is "at: sentence". Caught once, where a job or
+/// a request is handled.
 class InputError : public std::runtime_error {
  public:
   InputError(std::string at, const std::string& sentence)

@@ -6,14 +6,16 @@ namespace hilbrush {
 
 EdgeTable edge_table(const std::vector<Triangle>& triangles) {
   struct Entry {
-    std::uint32_t from, to;
+    std::uint32_t from;
+    std::uint32_t to;
     TriangleSide side;
   };
   std::vector<Entry> entries;
   entries.reserve(3 * triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
     for (std::uint8_t s = 0; s < 3; ++s) {
-      const std::uint32_t a = triangles[t][s], b = triangles[t][(s + 1) % 3];
+      const std::uint32_t a = triangles[t][s];
+      const std::uint32_t b = triangles[t][(s + 1) % 3];
       entries.push_back({std::min(a, b), std::max(a, b), {t, s}});
     }
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
@@ -40,7 +42,8 @@ Neighbors find_neighbors(const std::vector<Triangle>& triangles) {
   const EdgeTable table = edge_table(triangles);
   for (const EdgeGroup& group : table.groups) {
     if (group.end - group.begin != 2) continue;
-    const TriangleSide a = table.sides[group.begin], b = table.sides[group.begin + 1];
+    const TriangleSide a = table.sides[group.begin];
+    const TriangleSide b = table.sides[group.begin + 1];
     if (a.triangle == b.triangle || triangles[a.triangle][a.side] == triangles[b.triangle][b.side]) continue;
     neighbors[a.triangle][a.side] = b;
     neighbors[b.triangle][b.side] = a;

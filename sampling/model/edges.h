@@ -17,8 +17,10 @@ struct TriangleSide {
 
 /// The sides of all triangles that lie on one edge of the mesh, in order of their triangles.
 struct EdgeGroup {
-  std::uint32_t from = 0, to = 0;    ///< the edge's vertices, from < to
-  std::uint32_t begin = 0, end = 0;  ///< into EdgeTable::sides
+  std::uint32_t from = 0;   ///< the vertex with the smaller index
+  std::uint32_t to = 0;     ///< the other one
+  std::uint32_t begin = 0;  ///< of the edge's sides in EdgeTable::sides
+  std::uint32_t end = 0;    ///< one past the last one
 };
 
 struct EdgeTable {

@@ -7,10 +7,10 @@
 namespace hilbrush {
 namespace {
 
-double squared_distance(const Eigen::Vector3d& place, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+double squared_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const Eigen::Vector3d side = b - a;
-  const double along = std::clamp((place - a).dot(side) / side.squaredNorm(), 0., 1.);
-  return (a + along * side - place).squaredNorm();
+  const double along = std::clamp((point - a).dot(side) / side.squaredNorm(), 0., 1.);
+  return (a + along * side - point).squaredNorm();
 }
 
 }  // namespace

@@ -13,8 +13,8 @@
 namespace hilbrush {
 namespace {
 
-/// A triangle whose height is below this share of its longest side has no area that arithmetic could use.
-constexpr double kFlattest = 1e-10;
+/// Height over longest side: below this a triangle's area and normal are rounding errors.
+constexpr double kMinHeightRatio = 1e-10;
 
 /// Keeps the triangles for which `keep` is true, with everything that belongs to them. Returns how many were dropped.
 template <class Keep>
@@ -47,19 +47,20 @@ bool has_usable_corners(const TexturedMesh& mesh, std::size_t t) {
                              [&](std::uint32_t v) { return v < mesh.vertices.size() && mesh.vertices[v].allFinite(); });
 }
 
-/// The corner where the shortest side of a triangle begins, if that side is a point next to the longest one.
+/// The corner where the shortest side of a triangle begins, if that side is as good as a point compared with the
+/// longest one.
 std::optional<int> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
   std::array<double, 3> length2{};
   for (int k = 0; k < 3; ++k)
     length2[static_cast<std::size_t>(k)] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
   const auto shortest = std::min_element(length2.begin(), length2.end());
   const double longest2 = *std::max_element(length2.begin(), length2.end());
-  if (!(*shortest > 0) || *shortest > kFlattest * kFlattest * longest2) return std::nullopt;
+  if (!(*shortest > 0) || *shortest > kMinHeightRatio * kMinHeightRatio * longest2) return std::nullopt;
   return static_cast<int>(shortest - length2.begin());
 }
 
-/// Gives the ends of collapsed sides one position, so that what hung together over such a triangle still does: poles
-/// whose vertices differ by rounding. Returns whether there were any.
+/// Gives the ends of collapsed sides one position, so that triangles that were connected by such a triangle remain
+/// connected. Poles whose vertices differ by rounding have such sides. Returns whether there were any.
 bool close_collapsed_sides(TexturedMesh& mesh) {
   UnionFind positions(mesh.vertices.size());
   bool is_any = false;
@@ -81,7 +82,7 @@ bool has_area(const TexturedMesh& mesh, std::size_t t) {
   double longest2 = 0;
   for (int k = 0; k < 3; ++k)
     longest2 = std::max(longest2, (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm());
-  return 2 * mesh.area_vector(t).norm() > kFlattest * longest2;
+  return 2 * mesh.area_vector(t).norm() > kMinHeightRatio * longest2;
 }
 
 /// Gives equal positions one vertex, and drops the vertices that no triangle uses. Returns how many became one with
@@ -100,7 +101,8 @@ std::size_t weld_vertices(TexturedMesh& mesh) {
     return std::array{p.x(), p.y(), p.z()};
   };
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const auto ka = key(a), kb = key(b);
+    const auto ka = key(a);
+    const auto kb = key(b);
     return ka != kb ? ka < kb : a < b;
   });
   std::vector<std::uint32_t> first_equal(mesh.vertices.size());
@@ -141,13 +143,13 @@ std::size_t drop_duplicates(TexturedMesh& mesh) {
   return keep_triangles(mesh, [&](std::size_t t) { return !is_duplicate[t]; });
 }
 
-/// Two triangles run alike if they pass their common edge in opposite directions.
-bool run_alike(const std::vector<Triangle>& triangles, TriangleSide a, TriangleSide b) {
+/// Two triangles are oriented alike if they pass their common edge in opposite directions.
+bool are_oriented_alike(const std::vector<Triangle>& triangles, TriangleSide a, TriangleSide b) {
   return triangles[a.triangle][a.side] != triangles[b.triangle][b.side];
 }
 
-/// Parts of the surface that hang together over edges of two triangles: turned so that neighbors run alike, as most of
-/// each part already did. Edges where that is impossible (a Moebius strip has one) are cut.
+/// Orients each part of the surface that is connected by edges of two triangles: neighbors alike, as most of the part
+/// already was. Edges where that is impossible (a Moebius strip has one) are cut.
 class Orientation {
  public:
   Orientation(TexturedMesh& mesh, const EdgeTable& edges) : mesh_(mesh), partners_(mesh.triangle_count()) {
@@ -177,7 +179,7 @@ class Orientation {
   }
 
   std::size_t cut_count() const { return cut_count_; }
-  /// Who is joined to whom, by side, after everything.
+  /// By triangle and side: the side it is joined to.
   Neighbors& partners() { return partners_; }
   void turn_with_partners(std::uint32_t t) {
     turn_over(mesh_, t);  // sides 0, 1, 2 become 2, 1, 0
@@ -194,7 +196,9 @@ class Orientation {
   }
 
  private:
-  static constexpr char kUnseen = 0, kKeep = 1, kTurn = 2;
+  static constexpr char kUnseen = 0;
+  static constexpr char kKeep = 1;
+  static constexpr char kTurn = 2;
 
   std::vector<std::uint32_t> collect_part(std::uint32_t seed, std::vector<char>& state) const {
     std::vector<std::uint32_t> part{seed};
@@ -203,7 +207,7 @@ class Orientation {
       for (std::uint8_t s = 0; s < 3; ++s) {
         const TriangleSide other = partners_[part[i]][s];
         if (other == kNoSide || state[other.triangle] != kUnseen) continue;
-        const bool is_alike = run_alike(mesh_.triangles, {part[i], s}, other);
+        const bool is_alike = are_oriented_alike(mesh_.triangles, {part[i], s}, other);
         state[other.triangle] = is_alike == (state[part[i]] == kKeep) ? kKeep : kTurn;
         part.push_back(other.triangle);
       }
@@ -215,7 +219,7 @@ class Orientation {
       for (std::uint8_t s = 0; s < 3; ++s) {
         const TriangleSide other = partners_[t][s];
         if (other == kNoSide) continue;
-        const bool is_alike = run_alike(mesh_.triangles, {t, s}, other);
+        const bool is_alike = are_oriented_alike(mesh_.triangles, {t, s}, other);
         if (is_alike == (state[t] == state[other.triangle])) continue;
         partners_[t][s] = partners_[other.triangle][other.side] = kNoSide;
         ++cut_count_;
@@ -228,14 +232,14 @@ class Orientation {
   std::size_t cut_count_ = 0;
 };
 
-/// The sides on one edge with more than two triangles, by their angle around it. A triangle that runs along the edge
-/// has what is outside on its counter-clockwise hand, so it closes a solid with the next one clockwise that runs
-/// against.
+/// A triangle side on an edge that more than two triangles share.
 struct SideAround {
   TriangleSide side;
-  double angle = 0;
-  bool runs_along = false;
+  double angle = 0;         ///< of the triangle, around the edge
+  bool runs_along = false;  ///< from the edge's smaller vertex to the other
 };
+
+/// The sides on one edge, by their angle.
 
 std::vector<SideAround> sort_around(const TexturedMesh& mesh, const EdgeTable& edges, const EdgeGroup& group) {
   const Eigen::Vector3d origin = mesh.vertices[group.from];
@@ -263,11 +267,11 @@ std::size_t pair_up_crowded_edges(const TexturedMesh& mesh, const EdgeTable& edg
     const auto around = sort_around(mesh, edges, group);
     const std::size_t n = around.size();
     std::vector<char> is_joined(n, 0);
-    // A side that runs along `axis` has its apex to the left, seen with the axis up, and its outside towards growing
-    // angle ...
+    // The outside of a triangle that runs along the edge is towards growing angles, that of one that runs against it
+    // towards falling angles. So the sector between one that runs against and a following one that runs along is
+    // inside: the two enclose a solid.
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t next = (i + 1) % n;
-      // ... so that between one that runs against and a following one that runs along lies the solid they enclose.
       if (is_joined[i] || is_joined[next] || around[i].runs_along || !around[next].runs_along) continue;
       orientation.join(around[i].side, around[next].side);
       is_joined[i] = is_joined[next] = 1;
@@ -305,7 +309,7 @@ std::size_t turn_closed_parts_outwards(const TexturedMesh& mesh, Orientation& or
   return turned;
 }
 
-/// Gives every fan of triangles that hang together around a vertex a vertex of its own. Returns how many were added.
+/// Gives every fan of triangles, connected around a vertex, a vertex of its own. Returns how many were added.
 std::size_t split_vertices(TexturedMesh& mesh, const Neighbors& partners) {
   UnionFind fans(3 * mesh.triangle_count());
   for (std::uint32_t t = 0; t < partners.size(); ++t)
@@ -358,14 +362,14 @@ RepairedMesh repair_mesh(TexturedMesh mesh) {
   Orientation orientation(mesh, edges);
   std::size_t turned = orientation.orient();
   count("edges cut where the surface has one side only", orientation.cut_count());
-  // Turning moved sides about, so the edges are looked up again.
+  // Turning triangles over renumbered their sides, so the edge table is built again.
   const std::size_t crowded = pair_up_crowded_edges(mesh, edge_table(mesh.triangles), orientation);
   turned += turn_closed_parts_outwards(mesh, orientation);
   count("triangles turned over", turned);
   count("edges split where more than two triangles meet", crowded);
   std::size_t split = split_vertices(mesh, orientation.partners());
-  // A cut may end inside the surface, where both its sides still have the same vertices: from here on the triangles
-  // alone say what hangs together.
+  // A cut may end inside the surface, where both its sides still have the same vertices. From here on connection
+  // follows from the triangles alone, so it is found from them until nothing more is split.
   for (std::size_t added = split; added > 0; split += added)
     added = split_vertices(mesh, find_neighbors(mesh.triangles));
   count("vertices split where parts only touch", split);

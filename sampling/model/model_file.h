@@ -13,7 +13,7 @@
 /// OpenMesh. The kind is found from the first bytes, then from the name's ending. All bytes are untrusted.
 namespace hilbrush {
 
-/// What untrusted input may cost. Exceeding one is an InputError that names the limit.
+/// What untrusted input may cost. To exceed a limit is an InputError that names it.
 struct ModelLimits {
   std::size_t file_bytes = 256u << 20;  ///< each file, after gunzip
   std::size_t nodes = 2'000'000;        ///< VRML nodes, after USE and PROTO are expanded
@@ -31,7 +31,7 @@ enum class UpAxis { kY, kZ };
 struct Model {
   TexturedMesh mesh;                  ///< in the file's own units and axes
   std::optional<double> unit_m;       ///< meters of one unit of the file, where the format says (VRML: 1)
-  UpAxis up = UpAxis::kZ;             ///< the format's habit: VRML and OBJ y, STL and PLY and OFF z
+  UpAxis up = UpAxis::kZ;             ///< usual for the format: VRML and OBJ y, STL and PLY and OFF z
   std::vector<std::string> warnings;  ///< missing textures with the names tried, ignored nodes, dropped faces, ...
   std::vector<std::filesystem::path> files;  ///< everything that was read: the model, inlines, material files, images
 };

@@ -1,19 +1,18 @@
 #include "sampling/model/placement.h"
 
 #include <cmath>
-#include <cstdio>
 
 #include "sampling/base/input_error.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
 
-constexpr double kMaxSideM = 2;
+constexpr double kMaxSideM = 2;     ///< larger than any cell's workspace: a wrong unit
+constexpr double kMinSideM = 1e-6;  ///< below the resolution of axes and beam: a wrong unit
 
 std::string millimeters(double length_m) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g mm", length_m * 1e3);
-  return text;
+  return number(length_m * 1e3) + " mm";
 }
 
 /// Meters of one unit of the file.
@@ -22,7 +21,7 @@ double scale_of(const Model& model, const PlacementOptions& options, double long
     if (!std::isfinite(*options.size_m) || *options.size_m <= 0)
       throw InputError("", "the size must be more than 0 mm");
     const double scale = *options.size_m / longest_side;
-    // Saying both is fine as long as they agree.
+    // Both may be given as long as they agree.
     if (options.unit_m && std::abs(*options.unit_m / scale - 1) > 1e-6)
       throw InputError("", "--size-mm and --units-mm contradict each other: in units of " +
                                millimeters(*options.unit_m) + " the longest side is " +
@@ -55,7 +54,7 @@ TexturedMesh place_on_table(const Model& model, const PlacementOptions& options)
   if (!std::isfinite(size_m) || size_m > kMaxSideM)
     throw InputError("", "the object would be " + millimeters(size_m) + " long, more than " + millimeters(kMaxSideM) +
                              "; give --size-mm (its longest side) or --units-mm (one unit of the file)");
-  if (size_m < 1e-6) throw InputError("", "the object would be only " + millimeters(size_m) + " long");
+  if (size_m < kMinSideM) throw InputError("", "the object would be only " + millimeters(size_m) + " long");
   const Eigen::Vector3d foot((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, low.z());
   for (Eigen::Vector3d& p : mesh.vertices) p = scale * (p - foot);
   return mesh;

@@ -10,7 +10,7 @@ namespace hilbrush {
 struct PlacementOptions {
   std::optional<double> size_m = {};  ///< scale so that the longest side of the bounding box is this long
   std::optional<double> unit_m = {};  ///< or: meters of one unit of the file
-  std::optional<UpAxis> up = {};      ///< default: the format's habit
+  std::optional<UpAxis> up = {};      ///< default: that of the format
 };
 
 /// @throws InputError if neither the options nor the file say how large the object is (the sentence names both
