@@ -17,7 +17,7 @@ constexpr int kRimRays = 15, kBundleRays = 16;  // one packet: the rim, and the 
 constexpr std::size_t kWitnesses = 48;
 constexpr double kMillimeter = 1e-3;
 
-std::string millimeters(double length_m) {
+std::string length_text(double length_m) {
   return number(length_m / kMillimeter, 3) + " mm";
 }
 
@@ -121,7 +121,7 @@ std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double toleranc
     for (const Eigen::Vector3d& aside : {u, v, Eigen::Vector3d(-u), Eigen::Vector3d(-v)})
       is_met = is_met || lands(lands_short_m(focus, beam, aside, 1.5 * tolerance_m));
     if (!is_met && !short_m) return "the beam misses the object";
-    if (!is_met) return "the object blocks the beam " + millimeters(*short_m) + " before the dot";
+    if (!is_met) return "the object blocks the beam " + length_text(*short_m) + " before the dot";
   }
   for (int i = 1; i <= 100; ++i)
     if (is_in_table(focus - (.01 * i * length_m) * beam)) return "the table blocks the beam";

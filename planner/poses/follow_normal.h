@@ -4,9 +4,9 @@
 #include "planner/poses/posed_dots.h"
 #include "sampling/base/progress.h"
 
-/// The baseline that pose search is measured against: every dot is met head-on, one after another in the order given.
-/// The table turns for each of them; of the poses that bring the beam along the smooth normal, the one is taken that
-/// the axes reach soonest. Where no beam along the normal will do, the nearest to it that does.
+/// The baseline that pose search is measured against: the beam meets every dot along its normal, one after another in
+/// the order given. The table turns for each of them; of the poses that bring the beam along the smooth normal, the
+/// axes move to the one that they reach soonest. Where no beam along the normal is possible, the nearest possible one.
 namespace hilbrush {
 
 /// Cost: a few dozen arm solutions a dot. One thread: each pose depends on the one before.

@@ -10,13 +10,13 @@ namespace hilbrush {
 namespace {
 
 constexpr std::size_t kNeighbors = 8;
-constexpr std::int64_t kWindow = 5000;  // places that one move may shift or reverse
+constexpr std::int64_t kWindow = 5000;  // positions that one move may shift or reverse
 constexpr std::int64_t kKickWindow = 1000;
 constexpr std::size_t kTourBlock = 1 << 15;  // dots that are improved together
 constexpr std::int32_t kNone = -1;           // beyond an end of the path
 constexpr float kMinGainS = 1e-6F;
-/// What turning the tool saves a step is not always to be had, because turns add up.
-constexpr float kHopedFor = .7F;
+/// The share of the time saved by turning the tool that is counted: turns add up, so not all of it can be realized.
+constexpr float kTurnShare = .7F;
 
 /// The cost of a step; beyond the ends of the path there is none.
 class PathCost {
@@ -26,7 +26,7 @@ class PathCost {
   float operator()(std::int32_t a, std::int32_t b, float enough_s = std::numeric_limits<float>::infinity()) const {
     if (a == kNone || b == kNone) return 0;
     const PathDot &from = path_[static_cast<std::size_t>(a)], &to = path_[static_cast<std::size_t>(b)];
-    return step_.with_turn(from.arm, to.arm, from.per_yaw, to.per_yaw, kHopedFor, enough_s);
+    return step_.with_turn(from.arm, to.arm, from.per_yaw, to.per_yaw, kTurnShare, enough_s);
   }
 
  private:
@@ -36,7 +36,7 @@ class PathCost {
 
 struct Neighbor {
   std::int32_t dot;
-  float step_s;  ///< what going there costs, asked for too often to be worked out each time
+  float step_s;  ///< cost of the step there, kept because it is needed often
 };
 
 /// The nearest dots of each dot, by a hash-free grid: dots sorted by cell.
@@ -126,8 +126,8 @@ class Neighbors {
   std::vector<Neighbor> near_;
 };
 
-/// The path as an array of dots, and its local improvement. Whatever is done to the path is done by reversing stretches
-/// of it, so that a list of reversals is all it takes to undo a failed attempt.
+/// The path as an array of dots, and its local improvement. Every change of the path is made of reversals of stretches,
+/// so that a list of reversals suffices to undo a failed attempt.
 class LocalSearch {
  public:
   LocalSearch(const CellDescription& cell, std::span<const PathDot> path)
@@ -142,10 +142,10 @@ class LocalSearch {
 
   void descend() {
     for (const std::int32_t dot : std::vector<std::int32_t>(dot_at_)) queue_again(dot);
-    settle(40 * dot_at_.size());  // a bound; a few looks at each dot are usual
+    settle(40 * dot_at_.size());  // a bound; a few attempts at each dot are usual
   }
 
-  /// Swaps neighboring stretches here and there, descends from there, and keeps what is no worse.
+  /// Swaps random neighboring stretches, descends from there, and keeps the result if it is better.
   void perturb(std::size_t kicks) {
     constexpr std::int64_t kMax = 30;
     const auto count = static_cast<std::int64_t>(dot_at_.size());
@@ -192,14 +192,14 @@ class LocalSearch {
     queue_.push_back(dot);
   }
 
-  /// Improves around the queued dots until nothing improves, or `looks_at_most` have been looked at.
-  void settle(std::size_t looks_at_most) {
-    std::size_t looks = 0;
+  /// Improves around the queued dots until nothing improves, or `max_attempts` have been looked at.
+  void settle(std::size_t max_attempts) {
+    std::size_t attempts = 0;
     for (std::size_t next = 0; next < queue_.size(); ++next) {
       const std::int32_t dot = queue_[next];
       is_queued_[static_cast<std::size_t>(dot)] = false;
-      if (looks >= looks_at_most) continue;
-      for (++looks; two_opt(dot) || move_segment(dot); ++looks) {
+      if (attempts >= max_attempts) continue;
+      for (++attempts; two_opt(dot) || move_segment(dot); ++attempts) {
       }
     }
     queue_.clear();
@@ -274,7 +274,7 @@ class LocalSearch {
     const std::int64_t first = std::min(place(a), place(e)), last = std::max(place(a), place(e)), to = place(c);
     // Reading along the path, a segment put behind c begins with a; one put before c ends with it.
     const bool keeps_direction = (place(a) <= place(e)) == (beyond > 0);
-    // One reversal swaps the segment with what it passes; each is then turned back if need be.
+    // One reversal swaps the segment with what it passes; each is then reversed again if needed.
     const std::int64_t length = last - first + 1;
     if (to > last) {
       const std::int64_t end = beyond > 0 ? to : to - 1;

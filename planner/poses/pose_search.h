@@ -5,9 +5,9 @@
 #include "sampling/base/progress.h"
 
 /// A pose for each dot and the order in which dots are exposed, so that the cell takes little time at small incidence:
-///   aims (beam directions that many dots share) -> stations (table, yaw and elbow of each aim, in the order they are
-///   visited) -> leftovers -> ordering (the path over each station's dots)
-///   -> yaw_slack (yaw along the path).
+///   shared_beams (beam directions that many dots share) -> stations (table, yaw and elbow for each direction, in the
+///   order they are visited) -> unserved_dots -> ordering (the path over each station's dots) -> yaw_redundancy (yaw
+///   along the path).
 /// With the table at rest a dot costs little more than settling and its pulse; tables move only between stations.
 namespace hilbrush {
 

@@ -12,8 +12,8 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kAskedDots = 160;  // of a tour, to judge a station by
-constexpr double kMisfitS = .3;          // what a dot costs that the station does not serve
+constexpr std::size_t kRatedDots = 160;  // of a tour, by which a station is rated
+constexpr double kUnservedDotS = .3;     // cost of a dot that the station does not serve, s
 constexpr int kRounds = 2;
 
 struct Option {
@@ -22,7 +22,7 @@ struct Option {
   double work_s = 0;  ///< between the tour's dots
 };
 
-/// Moves of table and arm, C and J4 by the shorter way round.
+/// Moves of table and arm, C and J4 by the shorter turn.
 double repose_s(const CellDescription& cell, const Joints& a, const Joints& b) {
   double slowest_s = 0;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -37,19 +37,19 @@ double repose_s(const CellDescription& cell, const Joints& a, const Joints& b) {
 
 class StationChoice {
  public:
-  StationChoice(const AimedDots& dots, std::vector<Tour>& tours) : dots_(dots), reach_(dots.reach()), tours_(tours) {}
+  StationChoice(const DotsToPose& dots, std::vector<Tour>& tours) : dots_(dots), reach_(dots.reach()), tours_(tours) {}
 
   void find_options() {
     options_.resize(tours_.size());
     // More tours have less to choose from, so that their distances can be found in bounded time.
     const std::size_t kept = tours_.size() > 400 ? 4 : 12;
     tbb::parallel_for(std::size_t{0}, tours_.size(), [&](std::size_t t) {
-      options_[t] = tours_[t].is_placed ? placed_option(tours_[t]) : judged_options(tours_[t], kept);
+      options_[t] = tours_[t].is_placed ? placed_option(tours_[t]) : rated_options(tours_[t], kept);
     });
   }
 
-  /// Tours without any option give their dots away and are gone.
-  void drop_hopeless(std::vector<std::uint32_t>& unserved) {
+  /// Removes tours without any option; their dots go to `unserved`.
+  void remove_unplaceable(std::vector<std::uint32_t>& unserved) {
     std::size_t kept = 0;
     for (std::size_t t = 0; t < tours_.size(); ++t) {
       if (options_[t].empty()) {
@@ -97,12 +97,12 @@ class StationChoice {
     return {{option.station, joints ? *joints : home_joints(reach_.cell()), 0}};
   }
 
-  std::vector<Option> judged_options(const Tour& tour, std::size_t kept) const {
+  std::vector<Option> rated_options(const Tour& tour, std::size_t kept) const {
     std::vector<Option> options;
     for (const double tilt : reach_.tilts()) {
       for (const TableSolution& solution : solve_table(reach_.kinematics(), tilt, tour.beam_O))
         for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative})
-          if (auto option = judge(tour, {tilt, solution.rotation, solution.yaw, elbow})) options.push_back(*option);
+          if (auto option = rate(tour, {tilt, solution.rotation, solution.yaw, elbow})) options.push_back(*option);
     }
     std::stable_sort(options.begin(), options.end(),
                      [](const Option& a, const Option& b) { return a.work_s < b.work_s; });
@@ -110,18 +110,20 @@ class StationChoice {
     return options;
   }
 
-  /// By a few dots all along the tour, each with the one after it.
-  std::optional<Option> judge(const Tour& tour, const Station& station) const {
-    const std::size_t count = tour.dots.size(), asked = std::min(count, kAskedDots);
+  /// By a sample of dots along the tour, each with the one after it.
+  std::optional<Option> rate(const Tour& tour, const Station& station) const {
+    const std::size_t count = tour.dots.size();
+    const std::size_t rated = std::min(count, kRatedDots);
     Option option{station, {}, 0};
-    std::size_t served = 0, steps = 0;
+    std::size_t served = 0;
+    std::size_t steps = 0;
     double step_sum_s = 0;
-    for (std::size_t k = 0; k < asked; ++k) {
-      const std::size_t i = (2 * k + 1) * count / (2 * asked);
+    for (std::size_t k = 0; k < rated; ++k) {
+      const std::size_t i = (2 * k + 1) * count / (2 * rated);
       const auto joints = joints_at(reach_, station, dots_.position_O(tour.dots[i]), option.joints);
       if (!joints) continue;
       ++served;
-      if (2 * served <= asked + 1) option.joints = *joints;
+      if (2 * served <= rated + 1) option.joints = *joints;
       if (i + 1 == count) continue;
       const auto next = joints_at(reach_, station, dots_.position_O(tour.dots[i + 1]), *joints);
       if (!next) continue;
@@ -131,7 +133,7 @@ class StationChoice {
     if (served == 0) return std::nullopt;
     const auto n = static_cast<double>(count);
     const double mean_step_s = steps > 0 ? step_sum_s / static_cast<double>(steps) : 0;
-    option.work_s = n * (mean_step_s + kMisfitS * (1 - static_cast<double>(served) / static_cast<double>(asked)));
+    option.work_s = n * (mean_step_s + kUnservedDotS * (1 - static_cast<double>(served) / static_cast<double>(rated)));
     return option;
   }
 
@@ -159,9 +161,9 @@ class StationChoice {
   double distance_s(std::size_t a, std::size_t b) const {
     return static_cast<double>(distance_s_[a * (tours_.size() + 1) + b]);
   }
-  /// The tour at a place of the order; home before the first and after the last.
-  std::size_t at(std::size_t place_plus_one) const {
-    return place_plus_one == 0 || place_plus_one > order_.size() ? tours_.size() : order_[place_plus_one - 1];
+  /// The tour at a position of the order, counted from 1; home before the first and after the last.
+  std::size_t at(std::size_t position) const {
+    return position == 0 || position > order_.size() ? tours_.size() : order_[position - 1];
   }
 
   void start_nearest_first() {
@@ -178,10 +180,10 @@ class StationChoice {
   /// 2-opt and moving single tours, until nothing improves.
   void exchange() {
     constexpr double kMinStationGainS = 1e-5;
-    constexpr int kPassesAtMost = 60;
+    constexpr int kMaxPasses = 60;
     const std::size_t n = order_.size();
     bool is_improved = true;
-    for (int pass = 0; pass < kPassesAtMost && is_improved; ++pass) {
+    for (int pass = 0; pass < kMaxPasses && is_improved; ++pass) {
       is_improved = false;
       for (std::size_t i = 1; i <= n; ++i)
         for (std::size_t j = i + 1; j <= n; ++j) {
@@ -196,13 +198,13 @@ class StationChoice {
     }
   }
 
-  bool move_tour(std::size_t i, double least_gain_s) {
+  bool move_tour(std::size_t i, double min_gain_s) {
     const std::size_t tour = at(i);
     const double removed = distance_s(at(i - 1), tour) + distance_s(tour, at(i + 1)) - distance_s(at(i - 1), at(i + 1));
-    for (std::size_t j = 0; j <= order_.size(); ++j) {  // between places j and j + 1
+    for (std::size_t j = 0; j <= order_.size(); ++j) {  // between positions j and j + 1
       if (j == i || j + 1 == i) continue;
       const double added = distance_s(at(j), tour) + distance_s(tour, at(j + 1)) - distance_s(at(j), at(j + 1));
-      if (removed - added <= least_gain_s) continue;
+      if (removed - added <= min_gain_s) continue;
       const auto first = order_.begin();
       const auto from = static_cast<std::ptrdiff_t>(i - 1), to = static_cast<std::ptrdiff_t>(j);
       if (from < to)
@@ -245,7 +247,7 @@ class StationChoice {
     return chosen;
   }
 
-  const AimedDots& dots_;
+  const DotsToPose& dots_;
   const Reach& reach_;
   std::vector<Tour>& tours_;
   std::vector<std::vector<Option>> options_;  ///< by tour, best first
@@ -261,10 +263,10 @@ std::optional<Joints> joints_at(const Reach& reach, const Station& station, cons
   return reach.arm_joints(table, position_O, station.yaw, station.elbow, reference);
 }
 
-void place_stations(const AimedDots& dots, std::vector<Tour>& tours, std::vector<std::uint32_t>& unserved) {
+void place_stations(const DotsToPose& dots, std::vector<Tour>& tours, std::vector<std::uint32_t>& unserved) {
   StationChoice choice(dots, tours);
   choice.find_options();
-  choice.drop_hopeless(unserved);
+  choice.remove_unplaceable(unserved);
   choice.arrange();
 }
 

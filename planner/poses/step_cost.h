@@ -6,7 +6,7 @@
 
 #include "planner/reach/kinematics.h"
 
-/// The time model for what search asks millions of times: move and settle between two exposures from one pose of the
+/// The time model for the innermost loops of the search: move and settle between two exposures from one pose of the
 /// table, in single precision. Agrees with move_s() + settle_s() - settle_min_s to a rounding.
 namespace hilbrush {
 
@@ -37,16 +37,16 @@ class StepCost {
   /// Seconds above the shortest settling.
   float operator()(const ArmJoints& from, const ArmJoints& to) const { return cost_s(difference(from, to)); }
 
-  /// The same if the tool turns a little on the way, by as much as serves the step best: J1, J2 and J4 then share what
-  /// would be the first two's alone. `per_yaw`: how the joints follow the yaw at either end. Symmetric.
-  /// `share` of what that saves is taken off. From `enough_s` on the answer may be anything that is no less and no more
-  /// than the cost: most of those who ask only want to know whether a step is cheaper than another, and a bound does.
+  /// The same if the tool turns a little during the move, by the angle that is best for the step: J1, J2 and J4 then
+  /// share a move that would otherwise be J1's and J2's alone. `per_yaw`: how the joints follow the yaw at either end.
+  /// Symmetric. `share` of the time saved is subtracted. From `enough_s` on the result may be a lower bound that is not
+  /// below `enough_s`: most callers only compare steps, and a bound is enough for that.
   float with_turn(const ArmJoints& from, const ArmJoints& to, const ArmJoints& from_per_yaw,
                   const ArmJoints& to_per_yaw, float share = 1,
                   float enough_s = std::numeric_limits<float>::infinity()) const {
     const ArmJoints step = difference(from, to);
     const float plain_s = cost_s(step);
-    // One tick is the least; and no turn helps J3.
+    // No step is shorter than one tick, and no turn helps J3.
     const float least_s = std::max(tick_s_, axis_s(2, std::abs(step[2])));
     if (plain_s <= std::max(1.5F * tick_s_, least_s)) return plain_s;
     const float bound_s = plain_s - share * (plain_s - least_s);
@@ -78,8 +78,9 @@ class StepCost {
   }
 
   float cost_s(const ArmJoints& step) const {
-    float ramping = 0, cruising_s = 0,
-          share = 0;  // the slowest of those that do not reach full speed, and of those that do
+    float ramping = 0;     // of the slowest axis that does not reach full speed
+    float cruising_s = 0;  // of the slowest axis that does
+    float share = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       const float distance = std::abs(step[i]);
       share = std::max(share, distance * inverse_saturation_[i]);
@@ -105,11 +106,15 @@ class StepCost {
       return std::max(std::abs(at[0] + slope[0] * x),
                       std::max(std::abs(at[1] + slope[1] * x), std::abs(at[2] + slope[2] * x)));
     };
-    float best = 0, least = largest(0);
+    float best = 0;
+    float least = largest(0);
     const auto consider = [&](float difference, float slope_difference) {
       if (std::abs(slope_difference) < 1e-12F) return;
-      const float x = -difference / slope_difference, value = largest(x);
-      if (value < least) least = value, best = x;
+      const float x = -difference / slope_difference;
+      const float value = largest(x);
+      if (!(value < least)) return;
+      least = value;
+      best = x;
     };
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t j = (i + 1) % 3;

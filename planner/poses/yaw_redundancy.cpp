@@ -10,24 +10,24 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kWidest = 8 * kDegree;  // that the tool turns away from the station's yaw
+constexpr double kMaxTurn = 8 * kDegree;  // of the tool away from the station's yaw
 constexpr int kFinePerCoarse = 4;
-constexpr int kMaxToOneSide = 127;    // what back-pointers of a byte tell apart
+constexpr int kMaxToOneSide = 127;    // so that back-pointers fit into a byte
 constexpr std::size_t kBlock = 8192;  // dots whose yaws are chosen together
 constexpr float kNever = std::numeric_limits<float>::infinity();
 
-/// The yaws that a dot may have: so many to either side of a middle one, and how far apart those of two dots may be.
+/// The yaws that a dot may have: `half` to either side of a middle one.
 struct YawGrid {
   double step;  ///< rad
   int half;
-  int longest_turn;  ///< between two dots, in steps
+  int max_turn;  ///< between two dots, in steps
 
   int count() const { return 2 * half + 1; }
 };
 
 class YawPath {
  public:
-  YawPath(const AimedDots& dots, const AimCosts& costs, const Station& station, std::span<const std::uint32_t> tour,
+  YawPath(const DotsToPose& dots, const PoseCosts& costs, const Station& station, std::span<const std::uint32_t> tour,
           std::span<Joints> joints)
       : dots_(dots),
         costs_(costs),
@@ -42,7 +42,7 @@ class YawPath {
   /// First roughly, as far as the tool may turn; then in small steps around that.
   void improve() {
     const double coarse = one_tick_turn(), fine = coarse / kFinePerCoarse;
-    const YawGrid coarse_grid{coarse, std::min(kMaxToOneSide, static_cast<int>(kWidest / coarse)), 4};
+    const YawGrid coarse_grid{coarse, std::min(kMaxToOneSide, static_cast<int>(kMaxTurn / coarse)), 4};
     const YawGrid fine_grid{fine, 12, 8};
     for (std::size_t i = 0; i < tour_.size(); ++i) clear_.push_back({clear_turn(i, -1), clear_turn(i, 1)});
     choose(coarse_grid);
@@ -67,12 +67,12 @@ class YawPath {
                       .4 * kDegree);
   }
 
-  /// How far the tool may turn to one side so that beam and lens still pass everything.
+  /// How far the tool may turn to one side with beam and lens still clear.
   float clear_turn(std::size_t i, int side) const {
     constexpr int kTried = 5;
     const Eigen::Vector3d& position_O = dots_.position_O(tour_[i]);
     for (int k = kTried; k > 0; --k) {
-      const double turn = kWidest * k / kTried;
+      const double turn = kMaxTurn * k / kTried;
       const Eigen::Vector3d beam_O = table_.R_WO.transpose() * reach_.kinematics().beam_W(station_.yaw + side * turn);
       if (reach_.clearance().lens_obstruction(position_O, beam_O) == Obstruction::kNone &&
           reach_.clearance().beam_obstruction(position_O, beam_O) == Obstruction::kNone)
@@ -81,7 +81,7 @@ class YawPath {
     return 0;
   }
 
-  /// The cheapest way through the grid around where each dot's yaw is now.
+  /// The cheapest path through the grid around each dot's present yaw.
   void choose(const YawGrid& grid) {
     for (std::size_t begin = 0; begin < tour_.size(); begin += kBlock)
       choose(grid, begin, std::min(tour_.size(), begin + kBlock));
@@ -92,7 +92,7 @@ class YawPath {
     from_.assign((end - begin) * count, 0);
     Row before, now;
     fill(grid, begin, before);
-    if (begin > 0) {  // goes on from what was chosen before
+    if (begin > 0) {  // continues from the yaw chosen for the dot before
       Row chosen;
       fill(grid, begin - 1, chosen);
       for (std::size_t y = 0; y < count; ++y)
@@ -149,8 +149,8 @@ class YawPath {
       const auto k = static_cast<std::size_t>(y);
       if (now.cost_s[k] == kNever) continue;
       float least_s = kNever;
-      const int low = std::max(0, y + shift - grid.longest_turn);
-      const int high = std::min(grid.count() - 1, y + shift + grid.longest_turn);
+      const int low = std::max(0, y + shift - grid.max_turn);
+      const int high = std::min(grid.count() - 1, y + shift + grid.max_turn);
       for (int x = low; x <= high; ++x) {
         const auto j = static_cast<std::size_t>(x);
         if (before.cost_s[j] >= least_s) continue;
@@ -162,7 +162,7 @@ class YawPath {
       now.cost_s[k] = least_s == kNever ? kNever : now.cost_s[k] + least_s;
     }
     if (*std::min_element(now.cost_s.begin(), now.cost_s.end()) != kNever) return;
-    // Too far a turn away from everything before: begin again from the middle.
+    // Every yaw needs too long a turn from the dot before: start again from the middle.
     now.cost_s[static_cast<std::size_t>(grid.half)] = 0;
     from[grid.half] = static_cast<std::uint8_t>(best_before - before.cost_s.begin());
   }
@@ -176,8 +176,8 @@ class YawPath {
     if (reach_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics().beam_W(yaw))) joints_[i] = *joints;
   }
 
-  const AimedDots& dots_;
-  const AimCosts& costs_;
+  const DotsToPose& dots_;
+  const PoseCosts& costs_;
   const Reach& reach_;
   const Station& station_;
   const TablePose table_;
@@ -191,8 +191,8 @@ class YawPath {
 
 }  // namespace
 
-void use_yaw_slack(const AimedDots& dots, const AimCosts& costs, const Station& station,
-                   std::span<const std::uint32_t> tour, std::span<Joints> joints) {
+void use_yaw_redundancy(const DotsToPose& dots, const PoseCosts& costs, const Station& station,
+                        std::span<const std::uint32_t> tour, std::span<Joints> joints) {
   if (tour.empty()) return;
   YawPath(dots, costs, station, tour, joints).improve();
 }

@@ -53,11 +53,11 @@ constexpr std::array<const char*, kAxisCount> kPastLimit{"J1 past its limit",   
 constexpr std::array<const char*, kAxisCount> kAxisWords{"J1", "J2", "J3", "J4", "tilt", "rotation"};
 constexpr std::string_view kOutOfReach = "out of the arm's reach";
 
-std::string millimeters(double length_m) {
+std::string shortfall_mm(double length_m) {
   return amount(length_m * 1e3) + " mm";
 }
 
-std::string degrees(double angle) {
+std::string shortfall_degrees(double angle) {
   return amount(angle / kDegree) + " degrees";
 }
 
@@ -137,23 +137,23 @@ SkippedDot FailureTally::describe() const {
   if (stage_ == kTable) return past_limit(SkipReason::kIncidence, kTilt);
   if (stage_ == kLimit) {
     if (axis_ != kAxisCount) return past_limit(SkipReason::kJointLimit, axis_);
-    return {0,       SkipReason::kJointLimit,   millimeters(amount_) + " " + std::string(kOutOfReach), kOutOfReach,
+    return {0,       SkipReason::kJointLimit,   shortfall_mm(amount_) + " " + std::string(kOutOfReach), kOutOfReach,
             amount_, SkipMeasure::kExcessLength};
   }
   const Cause cause = cause_of(what_);
   SkippedDot skipped{0, cause.reason, cause.what, cause.what, amount_, SkipMeasure::kExcessLength};
   if (stage_ == kBeam) {
     skipped.measure = SkipMeasure::kFreeLength;
-    skipped.detail += " " + millimeters(amount_) + " from the dot";
+    skipped.detail += " " + shortfall_mm(amount_) + " from the dot";
   } else if (stage_ != kNone) {
-    skipped.detail += ", " + millimeters(amount_) + " too near";
+    skipped.detail += ", " + shortfall_mm(amount_) + " too near";
   }
   return skipped;
 }
 
 SkippedDot FailureTally::past_limit(SkipReason reason, std::size_t axis) const {
   const bool is_angle = axis != kJ3;
-  const std::string excess = is_angle ? degrees(amount_) : millimeters(amount_);
+  const std::string excess = is_angle ? shortfall_degrees(amount_) : shortfall_mm(amount_);
   return {0,
           reason,
           std::string(kAxisWords[axis]) + " " + excess + " past its limit",

@@ -66,13 +66,13 @@ double path_s(const CellDescription& cell, const std::vector<Joints>& path) {
   return sum;
 }
 
-TEST(YawSlack, TurnsTheToolAlongRowsThatTheArmAloneIsSlowAt) {
+TEST(YawRedundancy, TurnsTheToolAlongRowsThatTheArmAloneIsSlowAt) {
   Rows rows(2.2e-4);
   const Reach reach(rows.mesh, rows.cell, rows.options);
-  const AimedDots dots(reach, rows.dots, rows.dot_indices);
+  const DotsToPose dots(reach, rows.dots, rows.dot_indices);
   const std::vector<Joints> before = rows.nominal(reach);
   std::vector<Joints> after = before;
-  use_yaw_slack(dots, aim_costs(rows.options), rows.station, rows.tour, after);
+  use_yaw_redundancy(dots, pose_costs(rows.options), rows.station, rows.tour, after);
   EXPECT_LT(path_s(rows.cell, after), .85 * path_s(rows.cell, before));
 
   double widest = 0;
@@ -89,30 +89,30 @@ TEST(YawSlack, TurnsTheToolAlongRowsThatTheArmAloneIsSlowAt) {
   EXPECT_LT(widest, 8 * kDegree);
 }
 
-TEST(YawSlack, StaysNearTheNormalWhereThatIsWorthMore) {
+TEST(YawRedundancy, StaysNearTheNormalWhereThatIsWorthMore) {
   Rows rows(2.2e-4);
   const Reach reach(rows.mesh, rows.cell, rows.options);
-  const AimedDots dots(reach, rows.dots, rows.dot_indices);
-  AimCosts costs = aim_costs(rows.options);
+  const DotsToPose dots(reach, rows.dots, rows.dot_indices);
+  PoseCosts costs = pose_costs(rows.options);
   costs.incidence_s = 100;
   const std::vector<Joints> before = rows.nominal(reach);
   std::vector<Joints> after = before;
-  use_yaw_slack(dots, costs, rows.station, rows.tour, after);
+  use_yaw_redundancy(dots, costs, rows.station, rows.tour, after);
   for (std::size_t i = 0; i < after.size(); ++i)
     EXPECT_GE(-reach.kinematics().tool_pose(after[i]).beam_O.z(), std::cos(kNominal) - 1e-6) << i;
 }
 
-TEST(YawSlack, LongToursAreWalkedInBlocksWithoutASeam) {
+TEST(YawRedundancy, LongToursAreWalkedInBlocksWithoutASeam) {
   Rows rows(1e-4);
   const std::vector<std::uint32_t> once = rows.tour;
   while (rows.tour.size() < 20'000) rows.tour.insert(rows.tour.end(), once.begin(), once.end());
   const Reach reach(rows.mesh, rows.cell, rows.options);
-  const AimedDots dots(reach, rows.dots, rows.dot_indices);
+  const DotsToPose dots(reach, rows.dots, rows.dot_indices);
   const std::vector<Joints> one = rows.nominal(reach);
   std::vector<Joints> before;
   while (before.size() < rows.tour.size()) before.insert(before.end(), one.begin(), one.end());
   std::vector<Joints> after = before;
-  use_yaw_slack(dots, aim_costs(rows.options), rows.station, rows.tour, after);
+  use_yaw_redundancy(dots, pose_costs(rows.options), rows.station, rows.tour, after);
   EXPECT_LE(path_s(rows.cell, after), path_s(rows.cell, before));
   for (std::size_t i = 1; i < after.size(); ++i)
     if (i % once.size() != 0) {
