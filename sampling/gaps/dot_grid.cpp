@@ -55,15 +55,15 @@ DotGrid::Nearest DotGrid::nearest(const Eigen::Vector3d& place_O, const Eigen::V
   const Cell middle = cell_of(place_O);
   Nearest best;
   const auto take = [&best](std::uint32_t dot, double distance) {
-    // Of equals the first: the order in a cell is no one's business.
+    // Of equally near dots the one with the lowest index, so that the order within a cell does not matter.
     if (distance < best.distance_m || (distance == best.distance_m && dot < best.dot)) best = {dot, distance};
   };
-  // Shell by shell; what lies beyond shell s is further away than s cells.
+  // Shell by shell of cells around the middle one: shell s is at least s - 1 cells away.
   for (std::int64_t s = 0; static_cast<double>(s - 1) * size_ < std::min(best.distance_m, reach_m); ++s)
     for (std::int64_t x = -s; x <= s; ++x)
       for (std::int64_t y = -s; y <= s; ++y) {
-        const bool is_rim = std::abs(x) == s || std::abs(y) == s;
-        for (std::int64_t z = -s; z <= s; z += is_rim || s == 0 ? 1 : 2 * s)
+        const bool is_side = std::abs(x) == s || std::abs(y) == s;
+        for (std::int64_t z = -s; z <= s; z += is_side || s == 0 ? 1 : 2 * s)
           visit_cell(middle + Cell(x, y, z), place_O, normal_O, take);
       }
   return best.distance_m <= reach_m ? best : Nearest{};

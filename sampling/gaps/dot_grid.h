@@ -6,18 +6,20 @@
 
 #include "sampling/dots/dots.h"
 
-/// Dots by place: which is nearest, and which are near. Dots may be added; look-ups are thread-safe between additions.
+/// Dots sorted into cells, to find the nearest one or all that are near. Dots may be added; look-ups are thread-safe
+/// between additions. Why this is not the grid of sampling/fine: see cube_grid.h.
 namespace hilbrush {
 
-/// Normals with a smaller cosine between them belong to different sides of a wall.
+/// Normals with a smaller cosine between them (more than 104 degrees apart) belong to different sides of a wall.
 inline constexpr double kSameSide = -.25;
 
 class DotGrid {
  public:
-  /// Keeps a reference to `dots`, into which new ones are to be put before add(). Cells of `size_m`, a few pitches.
+  /// Keeps a reference to `dots`; a new dot must be appended there before add(). `size_m` is the side of a cell: a few
+  /// pitches.
   DotGrid(const std::vector<Dot>& dots, double size_m);
 
-  /// Takes in the dot with this index.
+  /// Adds the dot with this index.
   void add(std::uint32_t dot);
 
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -49,7 +51,7 @@ class DotGrid {
 
   const std::vector<Dot>& dots_;
   double size_;
-  std::vector<Slot> slots_;  ///< a power of two
+  std::vector<Slot> slots_;  ///< open addressing; their number is a power of two
   std::size_t used_ = 0;
   std::vector<std::uint32_t> next_;  ///< per dot: the next one in its cell
 };

@@ -11,13 +11,16 @@ DotPath::DotPath(const std::vector<Dot>& dots) : dots_(dots) {
     previous_.push_back(i == 0 ? kEnd : i - 1);
     next_.push_back(i + 1 == dots.size() ? kEnd : i + 1);
   }
-  if (!dots.empty()) first_ = 0, last_ = static_cast<std::uint32_t>(dots.size() - 1);
+  if (dots.empty()) return;
+  first_ = 0;
+  last_ = static_cast<std::uint32_t>(dots.size() - 1);
 }
 
 double DotPath::growth(std::uint32_t before, std::uint32_t after, const Dot& dot) const {
   const auto distance = [&](std::uint32_t i) { return i == kEnd ? 0 : (dots_[i].position_O - dot.position_O).norm(); };
-  const double gone = before == kEnd || after == kEnd ? 0 : (dots_[before].position_O - dots_[after].position_O).norm();
-  return distance(before) + distance(after) - gone;
+  const double removed =
+      before == kEnd || after == kEnd ? 0 : (dots_[before].position_O - dots_[after].position_O).norm();
+  return distance(before) + distance(after) - removed;
 }
 
 void DotPath::insert_last(const std::vector<std::uint32_t>& nearby) {
@@ -27,7 +30,10 @@ void DotPath::insert_last(const std::vector<std::uint32_t>& nearby) {
   double least = std::numeric_limits<double>::infinity();
   const auto consider = [&](std::uint32_t b, std::uint32_t a) {
     const double grown = growth(b, a, dots_[dot]);
-    if (grown < least) least = grown, before = b, after = a;
+    if (!(grown < least)) return;
+    least = grown;
+    before = b;
+    after = a;
   };
   for (const std::uint32_t near : nearby) {
     consider(previous_[near], near);

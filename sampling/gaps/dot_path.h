@@ -3,16 +3,17 @@
 
 #include "sampling/dots/dots.h"
 
+/// The order of dots while more are inserted.
 namespace hilbrush {
 
-/// The order of dots as a chain into which others are put.
+/// The order of dots as a doubly linked list.
 class DotPath {
  public:
   /// In the order of `dots`, to which it keeps a reference and to which new ones are appended.
   explicit DotPath(const std::vector<Dot>& dots);
 
-  /// Puts the last of the dots before or after one of `nearby`, where the path grows least; at the end if there are
-  /// none.
+  /// Inserts the last of the dots before or after one of `nearby`, where the path grows least; at the end if `nearby`
+  /// is empty.
   void insert_last(const std::vector<std::uint32_t>& nearby);
 
   /// The dots along the path.

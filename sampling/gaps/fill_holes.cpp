@@ -24,17 +24,20 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kMinGap = .5;
-/// Circles are filled from so much below the limit, so that the sweep, which calls no larger piece covered, finds
-/// little.
+/// In pitches. A hexagonal grid of dots has gaps of .62.
+constexpr double kMinGapPitches = .5;
+/// Circles are filled from this share below the limit, because the sweep stops halving pieces at that size
+/// (kFinestPiece in gap_meter.cpp): it then finds little that is left.
 constexpr double kMargin = .03;
+/// Voronoi diagrams at most; the sweep fills the rest.
 constexpr int kMaxRounds = 3;
-/// Steps of the walk from a dot to the middle of a hole: each crosses a dozen triangles.
+/// Steps of the walk from a dot to the middle of a hole at most; each crosses about a dozen triangles.
 constexpr int kMaxWalks = 16;
-/// New dots are put next to dots within so many radii of their hole.
-constexpr double kNeighborhood = 1.6;
-constexpr double kGridPitches = 2;
-/// Triangles are swept in so many blocks, whatever the number of threads.
+/// In radii of a hole: dots this near to its middle are where the new dot may be inserted into the path.
+constexpr double kNeighborhoodRadii = 1.6;
+/// Cells of the grid of dots.
+constexpr double kCellPitches = 2;
+/// Blocks of triangles in the sweep: fixed, so that the number of threads does not matter.
 constexpr std::size_t kBlocks = 256;
 
 /// Center of the circle through three points in space; none if they lie in line.
@@ -65,11 +68,11 @@ class HoleFilling {
         tone_(tone),
         dots_(sequence.dots),
         squares_(curve),
-        grid_(dots_, kGridPitches * sequence.pitch_m),
+        grid_(dots_, kCellPitches * sequence.pitch_m),
         path_(dots_),
         meter_(curve.surface(), tone, grid_, limit_m, darkest_at(tone, curve.mesh(), dots_)) {}
 
-  /// One Voronoi diagram for each square; returns how many dots it has brought.
+  /// Makes a Voronoi diagram for each chart and fills its holes; returns the number of dots added.
   std::uint64_t fill_circles() {
     std::vector<GapMeter::Hole> holes;
     for (std::uint32_t s = 0; s < curve_.charts().size(); ++s) {
@@ -83,7 +86,7 @@ class HoleFilling {
     return added;
   }
 
-  /// Proves all surface covered, or adds a dot.
+  /// Proves each piece of the surface covered or adds a dot there; returns the number of dots added.
   std::uint64_t sweep() {
     const std::size_t triangles = curve_.mesh().triangle_count();
     std::vector<std::vector<GapMeter::Suspect>> suspects(kBlocks);
@@ -110,7 +113,7 @@ class HoleFilling {
     const GapMeter::Hole hole = meter_.hole_at(point, slack_m);
     if (!(hole.size > 0)) return false;
     const Dot dot = make_dot(curve_.surface(), tone_, point, squares_.component(point.triangle));
-    const auto nearby = grid_.within(dot.position_O, dot.normal_O, kNeighborhood * hole.radius_m);
+    const auto nearby = grid_.within(dot.position_O, dot.normal_O, kNeighborhoodRadii * hole.radius_m);
     dots_.push_back(dot);
     path_.insert_last(nearby);
     grid_.add(static_cast<std::uint32_t>(dots_.size() - 1));
@@ -135,7 +138,7 @@ class HoleFilling {
     return holes;
   }
 
-  /// The hole in the middle of three dots, judged in space.
+  /// The hole in the middle of three dots, measured in space.
   GapMeter::Hole hole_between(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
     const auto center = circle_center(dots_[a].position_O, dots_[b].position_O, dots_[c].position_O);
     if (!center) return {};
@@ -166,8 +169,8 @@ class HoleFilling {
 
 DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots, double largest_gap_pitches,
                        FillReport* report, const Progress& progress) {
-  if (!(largest_gap_pitches >= kMinGap))
-    throw InputError("largest_gap", "must be at least .5 pitches: a gap that small asks for a dot everywhere");
+  if (!(largest_gap_pitches >= kMinGapPitches))
+    throw InputError("largest_gap", "must be at least .5 pitches: even a hexagonal grid has gaps of .62");
   FillReport result;
   if (!dots.dots.empty()) {
     HoleFilling filling(curve, tone, dots, largest_gap_pitches * dots.pitch_m);

@@ -13,13 +13,13 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Looks for the mean tone of a disc.
-constexpr int kLooks = 24;
-/// A hole is looked at to so many times the radius that it may have.
-constexpr double kFarthest = 8;
+/// Samples of the tone over a disc for its mean.
+constexpr int kToneSamples = 24;
+/// The nearest dot is searched for up to this multiple of the allowed radius; larger holes count as that large.
+constexpr double kMaxRadiusShare = 8;
 /// Pieces of a triangle are halved until their radius is this share of the largest gap there ...
 constexpr double kFinestPiece = .03;
-/// ... and below this share one mean tone does for a piece, however noisy.
+/// ... and below this share a piece is judged by its mean tone, however noisy it is.
 constexpr double kOneTone = .25;
 
 }  // namespace
@@ -35,13 +35,13 @@ double GapMeter::mean_tone(const SurfacePoint& point, double radius_m) const {
   const Vector3d middle = position(surface_.mesh, point), normal = face_normal(surface_.mesh, point);
   const Vector3d across = normal.unitOrthogonal(), along = normal.cross(across);
   double sum = 0;
-  for (int k = 0; k < kLooks; ++k) {
-    // Vogel's sunflower: even over the disc.
-    const double r = radius_m * std::sqrt((k + .5) / kLooks), turn = k * std::numbers::pi * (3 - std::sqrt(5.));
+  for (int k = 0; k < kToneSamples; ++k) {
+    // Vogel's sunflower pattern (golden angle): even over the disc.
+    const double r = radius_m * std::sqrt((k + .5) / kToneSamples), turn = k * std::numbers::pi * (3 - std::sqrt(5.));
     const Vector3d target = middle + r * (std::cos(turn) * across + std::sin(turn) * along);
     sum += tone_.asked(walk_towards(surface_, point, target));
   }
-  return sum / kLooks;
+  return sum / kToneSamples;
 }
 
 GapMeter::Hole GapMeter::hole_at(const SurfacePoint& point, double slack_m) const {
@@ -51,11 +51,14 @@ GapMeter::Hole GapMeter::hole_at(const SurfacePoint& point, double slack_m) cons
   const double allowed = limit_ / std::sqrt(asked);
   const Vector3d place = position(surface_.mesh, point);
   const Eigen::Vector3f normal = face_normal(surface_.mesh, point).cast<float>();
-  const DotGrid::Nearest nearest = grid_.nearest(place, normal, kFarthest * allowed);
-  const double radius = nearest.dot == DotGrid::kNone ? kFarthest * allowed : nearest.distance_m;
+  const DotGrid::Nearest nearest = grid_.nearest(place, normal, kMaxRadiusShare * allowed);
+  const double radius = nearest.dot == DotGrid::kNone ? kMaxRadiusShare * allowed : nearest.distance_m;
   if (radius + slack_m <= allowed) return hole;
   const double size = (radius + slack_m) * std::sqrt(std::min(asked, mean_tone(point, radius))) / limit_;
-  if (size > 1) hole.size = size, hole.radius_m = radius;
+  if (size > 1) {
+    hole.size = size;
+    hole.radius_m = radius;
+  }
   return hole;
 }
 
@@ -91,7 +94,7 @@ void GapMeter::find_suspects(std::uint32_t triangle, std::vector<Suspect>& suspe
     waiting.pop_back();
     std::array<Vector3d, 3> places;
     for (std::size_t c = 0; c < 3; ++c) places[c] = place_of(corners[c]);
-    // The middle of the longest side or the centroid: whichever reaches all corners sooner.
+    // A ball around the middle of the longest side or around the centroid holds the piece: the smaller one is used.
     std::size_t longest = 0;
     for (std::size_t side = 1; side < 3; ++side)
       if ((places[(side + 1) % 3] - places[side]).norm() > (places[(longest + 1) % 3] - places[longest]).norm())

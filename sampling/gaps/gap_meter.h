@@ -5,7 +5,7 @@
 #include "sampling/gaps/dot_grid.h"
 #include "sampling/tone/tone_field.h"
 
-/// Whether a place is the middle of a hole; see fill_holes.h for what a gap is.
+/// Measures the hole around a place; fill_holes.h defines a gap.
 namespace hilbrush {
 
 class GapMeter {
@@ -14,18 +14,18 @@ class GapMeter {
   GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m, double darkest);
 
   double limit_m() const { return limit_; }
-  /// What is allowed where the tone is darkest.
+  /// The largest gap allowed where the tone is darkest, in meters.
   double strictest_m() const;
 
   struct Hole {
     SurfacePoint point;
-    double size = 0;  ///< radius over what it may be; 0: no hole
+    double size = 0;  ///< radius over the allowed one; 0: no hole
     double radius_m = 0;
   };
   /// The hole around a point that stands for all within `slack_m` of it. Thread-safe.
   Hole hole_at(const SurfacePoint& point, double slack_m) const;
 
-  /// A point that stands for a piece of a triangle, of this radius, that is not covered for certain.
+  /// A point that stands for a piece of a triangle with this radius, which may not be covered.
   struct Suspect {
     SurfacePoint point;
     double radius_m = 0;

@@ -4,7 +4,7 @@
 
 #include "sampling/curve/surface_curve.h"
 
-/// Where surface points lie on the unit squares that the curve walks.
+/// Places of surface points on the unit squares through which the curve runs.
 namespace hilbrush {
 
 class SquarePlaces {

@@ -10,15 +10,16 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Where a plane crosses an edge of a triangle. Reckoned from the edge's lower vertex index, so that the triangles on
-/// both sides get the same place.
+/// Where a plane crosses an edge of a triangle. Calculated from the vertex with the lower index, so that the triangles
+/// on both sides get the same place, to the last bit.
 struct Crossing {
   std::uint64_t edge = 0;
   Vector3d b = Vector3d::Zero(), place;
 };
 
 Crossing cross_edge(const TexturedMesh& mesh, std::uint32_t t, int side, double z) {
-  int from = side, to = (side + 1) % 3;
+  int from = side;
+  int to = (side + 1) % 3;
   const auto vertex = [&](int corner) { return mesh.triangles[t][static_cast<std::size_t>(corner)]; };
   if (vertex(from) > vertex(to)) std::swap(from, to);
   const Vector3d &p = mesh.corner(t, from), &q = mesh.corner(t, to);
@@ -31,11 +32,11 @@ Crossing cross_edge(const TexturedMesh& mesh, std::uint32_t t, int side, double 
   return crossing;
 }
 
-/// The end of a piece: twice its index, one more for where it ends.
+/// One of the two ends of a piece: 2 * index for its start, 2 * index + 1 for its end.
 using End = std::size_t;
 constexpr End kNoEnd = std::numeric_limits<End>::max();
 
-/// Per end, the one other end on its edge.
+/// For each end the other end on the same edge; kNoEnd if there is none or more than one.
 std::vector<End> find_partners(const std::vector<ContourPiece>& pieces) {
   std::vector<std::pair<std::uint64_t, End>> ends;
   for (std::size_t i = 0; i < pieces.size(); ++i) {

@@ -4,7 +4,7 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// What horizontal planes cut out of a mesh.
+/// The intersections of a mesh with horizontal planes.
 namespace hilbrush {
 
 /// A straight piece of a contour, within one triangle.
@@ -18,7 +18,7 @@ struct ContourPiece {
   double length() const { return (to_O - from_O).norm(); }
 };
 
-/// Pieces that follow each other, each beginning on the edge where the one before ends.
+/// A chain of pieces: each begins on the edge on which the one before ends.
 struct Contour {
   std::vector<ContourPiece> pieces;
   bool is_closed = false;
@@ -48,7 +48,7 @@ class Slices {
 };
 
 /// Joins the pieces of one slice: open contours first, then closed ones, each in order of its first piece. Where more
-/// than two pieces meet on an edge (a surface that is no manifold) contours end. Cost O(n log n).
+/// than two pieces meet on an edge (a surface that is not a manifold) contours end. Cost O(n log n).
 std::vector<Contour> join(std::vector<ContourPiece> pieces);
 
 }  // namespace hilbrush

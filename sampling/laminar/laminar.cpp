@@ -19,11 +19,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Tone is looked up so many times a pitch along a contour.
-constexpr double kLooksPerPitch = 8;
-/// Rounds of the search for the pitch, and when it has ended.
+/// Samples of the tone along a contour.
+constexpr double kSamplesPerPitch = 8;
+/// The search for the pitch that gives a count of dots ends after this many trials, or at this relative error. Dots are
+/// then spread along the contours so that the count is exact.
 constexpr int kMaxTrials = 8;
-constexpr double kCloseEnough = .002;
+constexpr double kCountTolerance = .002;
+/// A limit for nonsense settings: 1 m at this many slices is a pitch of 0.1 micrometers.
 constexpr double kMaxSlices = 1e7;
 
 SurfacePoint point_on(const ContourPiece& piece, double share) {
@@ -36,14 +38,14 @@ template <class Visit>
 void walk_piece(const ToneField& tone, const ContourPiece& piece, double pitch_m, Visit visit) {
   if (tone.is_blank(piece.triangle)) return;
   const double length = piece.length();
-  const auto steps = static_cast<int>(std::clamp(std::ceil(length / pitch_m * kLooksPerPitch), 1., 1e6));
+  const auto steps = static_cast<int>(std::clamp(std::ceil(length / pitch_m * kSamplesPerPitch), 1., 1e6));
   for (int i = 0; i < steps; ++i) {
     const double asked = tone.asked(point_on(piece, (i + .5) / steps));
     if (asked > 0) visit(static_cast<double>(i) / steps, (i + 1.) / steps, asked * length / steps);
   }
 }
 
-/// Asked tone times length, summed over all slices: what is to be shared out among the dots.
+/// Asked tone times length, summed over all slices: what the dots share equally.
 double toned_length(const Slices& slices, const ToneField& tone, double pitch_m) {
   std::vector<double> of_slice(slices.count(), 0);
   tbb::parallel_for(std::size_t{0}, slices.count(), [&](std::size_t k) {
@@ -55,7 +57,8 @@ double toned_length(const Slices& slices, const ToneField& tone, double pitch_m)
   return sum;
 }
 
-/// A first guess at toned_length * pitch: a slice meets a wall that leans by its sine.
+/// An estimate of toned_length * pitch: the length of slices on a face is its area times the sine of its slope, over
+/// the pitch.
 double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
   const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
   double mass = 0;
@@ -68,18 +71,23 @@ double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
 
 double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, std::uint64_t count) {
   const double wanted = static_cast<double>(count);
-  double pitch = std::sqrt(mass / wanted), best = pitch, best_error = 1e300;
-  for (int round = 0; round < kMaxTrials && pitch > 0 && best_error > kCloseEnough; ++round) {
+  double pitch = std::sqrt(mass / wanted);
+  double best = pitch;
+  double best_error = 1e300;
+  for (int round = 0; round < kMaxTrials && pitch > 0 && best_error > kCountTolerance; ++round) {
     const double found = toned_length(Slices(mesh, pitch), tone, pitch) / pitch;
     const double error = std::abs(found / wanted - 1);
-    if (error < best_error) best_error = error, best = pitch;
+    if (error < best_error) {
+      best_error = error;
+      best = pitch;
+    }
     pitch = found > 0 ? pitch * std::sqrt(found / wanted) : pitch / 2;
   }
   if (!(best > 0)) throw InputError("", "no horizontal slice meets a surface that is to be painted");
   return best;
 }
 
-/// Where the walk is, and where along it the dots go.
+/// Walks along the contours and places dots on the way.
 class SliceWalk {
  public:
   SliceWalk(const Surface& surface, const std::vector<std::uint32_t>& component_of, const ToneField& tone,
@@ -109,12 +117,15 @@ class SliceWalk {
     for (std::size_t i = 0; i < contours.size(); ++i) {
       const auto& pieces = contours[i].pieces;
       const double distance = std::min(distance_to(pieces.front().from_O), distance_to(pieces.back().to_O));
-      if (distance < best_distance) best = i, best_distance = distance;
+      if (distance < best_distance) {
+        best = i;
+        best_distance = distance;
+      }
     }
     return best;
   }
 
-  /// Turns a closed contour to its nearest piece, an open one to its nearer end.
+  /// Makes a closed contour begin at its nearest piece, an open one at its nearer end.
   void begin_nearby(Contour& contour) const {
     auto& pieces = contour.pieces;
     if (contour.is_closed) {
@@ -146,8 +157,8 @@ class SliceWalk {
   const std::vector<std::uint32_t>& component_of_;
   const ToneField& tone_;
   double pitch_, spacing_;
-  double passed_ = 0;  ///< toned length so far
-  std::optional<Vector3d> here_;
+  double passed_ = 0;             ///< toned length so far
+  std::optional<Vector3d> here_;  ///< the end of the last contour
   std::vector<Dot> dots_;
 };
 
@@ -178,7 +189,8 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   const double pitch = options.pitch_m ? *options.pitch_m : pitch_for(mesh, tone, mass, *options.dot_count);
   check_dot_limit(options, options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch));
   const auto [low, high] = bounds(mesh);
-  if ((high.z() - low.z()) / pitch > kMaxSlices) throw InputError("", "too many slices: lower the dpi or the size");
+  if ((high.z() - low.z()) / pitch > kMaxSlices)
+    throw InputError("", "more than 10,000,000 slices: lower the dpi or the size");
   sequence.pitch_m = pitch;
   const Slices slices(mesh, pitch);
   const double length = toned_length(slices, tone, pitch);
