@@ -5,13 +5,14 @@
 
 #include "sampling/parametric/density.h"
 
-/// The adaptive curve over the unit square of a parametric surface (the thesis, figure 4.6), walked and not kept.
+/// The adaptive curve over the unit square of a parametric surface (the thesis, figure 4.6), walked without keeping it.
 namespace hilbrush {
 
 /// When a quad is divided.
 struct DivisionRule {
-  int minimum_depth = 0, maximum_depth = 0;
-  double largest_reach = 0;  ///< from a quad's center to its corners and mid-sides, on the surface
+  int minimum_depth = 0;
+  int maximum_depth = 0;
+  double largest_reach = 0;  ///< distance on the surface from a quad's center to its corners and mid-sides
 };
 
 /// A square of the parameter domain: column x and row y of side_count^2 equal ones.
@@ -24,7 +25,7 @@ struct Node {
   std::array<Eigen::Vector3d, 9> grid;  ///< positions of corners, mid-sides and center, row by row, if has_grid
 
   double size() const { return 1 / static_cast<double>(side_count); }
-  /// The place that has gone `right` and `up`, 0 to 1, of its size from its lower left corner.
+  /// The place at the shares `right` and `up` (0 to 1) of the square, from its lower left corner.
   Eigen::Vector2d uv(double right, double up) const {
     return Eigen::Vector2d(static_cast<double>(x) + right, static_cast<double>(y) + up) /
            static_cast<double>(side_count);
@@ -45,7 +46,7 @@ class AdaptiveCurve {
   AdaptiveCurve(const ParametricSurface& surface, const DensityOnSurface& density, const DivisionRule& rule)
       : surface_(surface), density_(density), rule_(rule) {}
 
-  /// The nodes of one depth in order of the curve; at most the minimum depth. What threads share out.
+  /// The nodes of one depth, at most the minimum depth, in order of the curve: units of work for threads.
   std::vector<NodeType> nodes_at(int depth) const {
     std::vector<NodeType> nodes{NodeType{}};
     for (int d = 0; d < depth; ++d) {
@@ -57,7 +58,7 @@ class AdaptiveCurve {
     return nodes;
   }
 
-  /// Hands on all leaves below a node, in order.
+  /// Calls visit(leaf) for all leaves below a node, in order.
   template <class Visit>
   void walk(NodeType& node, Visit&& visit) const {
     if (!is_divided(node)) return visit(node);

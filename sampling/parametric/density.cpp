@@ -9,15 +9,16 @@
 namespace hilbrush {
 namespace {
 
+/// Places of the grid along each side of the domain.
 constexpr int kGrid = 256;
-/// Share of the area that has less curvature than where it is clipped.
-constexpr double kClippedAbove = .995;
+/// Curvature is clipped at the value that this share of the area is below (ParametricDensity).
+constexpr double kUnclippedShare = .995;
 
 bool is_curvature(ParametricDensity density) {
   return density == ParametricDensity::kMeanCurvature || density == ParametricDensity::kGaussianCurvature;
 }
 
-/// The value below which lies `share` of the weight of all.
+/// The value below which `share` of the total weight lies.
 double weighted_quantile(std::vector<std::pair<double, double>> values_and_weights, double share) {
   std::sort(values_and_weights.begin(), values_and_weights.end());
   double total = 0, passed = 0;
@@ -40,7 +41,7 @@ DensityOnSurface::DensityOnSurface(const ParametricSurface& surface, ParametricD
       const double area = surface.area_element(uv) / (kGrid * kGrid);
       if (std::isfinite(area)) densities_and_areas.emplace_back(unclipped(uv), area);
     }
-  if (is_curvature(density)) largest_ = weighted_quantile(densities_and_areas, kClippedAbove);
+  if (is_curvature(density)) largest_ = weighted_quantile(densities_and_areas, kUnclippedShare);
   double mass = 0;
   for (const auto& [value, area] : densities_and_areas) {
     area_ += area;

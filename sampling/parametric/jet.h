@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-/// Functions of one variable with their first two derivatives: what parametric surfaces are put together from.
+/// Functions of one variable with their first two derivatives: parametric surfaces are composed of them.
 namespace hilbrush {
 
 struct Jet {
@@ -43,7 +43,7 @@ inline Jet cube_root(const Jet& a) {
 /// sin(x) / x
 inline Jet sinc(const Jet& a) {
   const double x = a.value, x2 = x * x;
-  if (std::abs(x) < .1)  // the series to x^6: 1e-12 off at most
+  if (std::abs(x) < .1)  // the series to x^6: errors below 1e-12
     return compose(1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42)), -x / 3 * (1 - x2 / 10 * (1 - x2 / 28)),
                    -1. / 3 + x2 / 10 * (1 - x2 * 5 / 84), a);
   const double s = std::sin(x), c = std::cos(x);

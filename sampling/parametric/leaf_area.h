@@ -28,14 +28,14 @@ double form_area(const ParametricSurface& surface, const Node<Quad>& leaf) {
   return std::isfinite(element) ? element * leaf.size() * leaf.size() : square_area(surface, leaf);
 }
 
-/// A vertex of the curve with the area that is its own and the place whose density counts for it.
+/// The area that belongs to a vertex of the curve, and the place whose density is used for it.
 struct VertexArea {
   double area = 0;
   Eigen::Vector2d density_uv;
 };
 
-/// Walks a node's leaves and hands each on with its area: visit(leaf, VertexArea). Method (a) looks at the vertices
-/// before and after, beyond the node's ends too; the curve's first and last vertex have no triangle and no area.
+/// Walks the leaves of a node and calls visit(leaf, VertexArea) for each. Method (a) uses the vertices before and
+/// after, also beyond the ends of the node; the first and the last vertex of the curve have no triangle and no area.
 template <class Quad>
 class AreaWalk {
  public:
@@ -74,7 +74,7 @@ class AreaWalk {
     return {triangle_area(a.position, b.position, c.position), (a.uv + b.uv + c.uv) / 3};
   }
 
-  /// Leaves are handed on one step late, when the vertex after them is known.
+  /// Leaves are visited one step late, when the vertex after them is known.
   template <class Visit>
   void walk_triangles(std::size_t index, Visit&& visit) const {
     std::optional<Vertex> before, current;

@@ -9,9 +9,10 @@
 #include "sampling/base/enum_names.h"
 #include "sampling/options/sample_options.h"
 
-/// Dots on surfaces that are given by a formula, as in chapters 4 and 5 of the thesis:
+/// Dots on surfaces given by a formula, as in chapters 4 and 5 of the thesis:
 ///   surface, density -> adaptive curve over [0, 1]^2 -> area of each leaf -> strata -> dots.
-/// Used to measure the method where truth is known; what is painted comes through SurfaceCurve (sample.h).
+/// Used to measure the method where the exact answer is known. Painted models are sampled through SurfaceCurve
+/// (sampling/curve/surface_curve.h).
 /// Lengths are in the units of the formula.
 namespace hilbrush {
 
@@ -36,7 +37,7 @@ class ParametricSurface {
 
   /// Unit; where the tangents do not span a plane (a pole), that of a place next to it.
   Eigen::Vector3d normal(const Eigen::Vector2d& uv) const;
-  /// dA / (du dv) = sqrt(EG - F^2), the root that equation 2.22 leaves out.
+  /// dA / (du dv) = sqrt(EG - F^2); equation 2.22 omits the root.
   double area_element(const Eigen::Vector2d& uv) const;
   /// K = k1 k2 and H = (k1 + k2) / 2 of the shape operator (equation 2.33). Not finite where the surface is singular.
   double gaussian_curvature(const Eigen::Vector2d& uv) const;
@@ -105,7 +106,7 @@ struct ParametricOptions {
   ParametricDensity density = ParametricDensity::kConstant;
   Sampler sampler = Sampler::kJittered;  ///< all but kBlue and kFine, which need a mesh
   std::uint64_t seed = 1;
-  /// Vertices of the curve for a dot. The thesis finds 10 enough (section 4.2.1), which puts dots on vertices; here
+  /// Vertices of the curve for each dot. The thesis finds 10 enough (section 4.2.1), which puts dots on vertices; here
   /// they go anywhere in a leaf.
   double omega = 4;
   /// Depth of the curve: at least (else 5 with hilbert, 3 with peano2) and at most (else 13 and 8).
@@ -127,12 +128,12 @@ struct ParametricSamples {
   int deepest = 0;                  ///< its greatest depth
 };
 
-/// Spreads dots by the adaptive curve (figures 4.1 and 4.6): a quad is divided while its depth is below the minimum, or
-/// while it is below the maximum and one of its corners or mid-sides is further from its center than half the spacing
-/// of omega * dot_count vertices, in space and - where the density is above its mean - by density. Leaves are not
-/// stored but walked twice, in parallel: to measure, then to place. Same options, same bytes.
-/// @throws InputError for a sampler, curve, depth or count that it can't do, or a density that is zero everywhere.
-/// Cost: about 60 ns a leaf on the sphere. Memory: the dots.
+/// Places dots along the adaptive curve (figures 4.1 and 4.6): a quad is divided while its depth is below the minimum,
+/// or while it is below the maximum and one of its corners or mid-sides is further from its center than half the
+/// spacing of omega * dot_count vertices, in space and - where the density is above its mean - by density. Leaves are
+/// not stored but walked twice, in parallel: to measure, then to place. The same options give the same bytes.
+/// @throws InputError for a sampler, curve, depth or count that it does not support, or a density that is zero
+/// everywhere. Cost: about 60 ns a leaf on the sphere. Memory: the dots.
 ParametricSamples sample_parametric(const ParametricSurface& surface, const ParametricOptions& options);
 
 /// Area of the surface as each method measures it on the same curve, indexed by AreaMethod.

@@ -17,16 +17,23 @@ using Eigen::Vector2d;
 
 constexpr std::uint64_t kMaxDots = 100'000'000;
 
-/// Depths that suit a curve.
+/// Depths of a curve: that of the nodes on which threads work, the defaults of minimum and maximum, and the largest one
+/// that a setting may ask for, at which the number of leaves is still exact in a double.
 template <class Quad>
 struct Depths;
 template <>
 struct Depths<HilbertQuad> {
-  static constexpr int kShared = 5, kMinimum = 5, kMaximum = 13, kLimit = 26;
+  static constexpr int kNodes = 5;
+  static constexpr int kDefaultMin = 5;
+  static constexpr int kDefaultMax = 13;
+  static constexpr int kLimit = 26;
 };
 template <>
 struct Depths<PeanoQuad> {
-  static constexpr int kShared = 3, kMinimum = 3, kMaximum = 8, kLimit = 16;
+  static constexpr int kNodes = 3;
+  static constexpr int kDefaultMin = 3;
+  static constexpr int kDefaultMax = 8;
+  static constexpr int kLimit = 16;
 };
 
 template <class Quad>
@@ -37,8 +44,8 @@ DivisionRule rule_of(const ParametricOptions& options, const DensityOnSurface& d
     return depth;
   };
   DivisionRule rule;
-  rule.minimum_depth = checked(options.minimum_depth.value_or(Depths<Quad>::kMinimum), "minimum_depth");
-  rule.maximum_depth = checked(options.maximum_depth.value_or(Depths<Quad>::kMaximum), "maximum_depth");
+  rule.minimum_depth = checked(options.minimum_depth.value_or(Depths<Quad>::kDefaultMin), "minimum_depth");
+  rule.maximum_depth = checked(options.maximum_depth.value_or(Depths<Quad>::kDefaultMax), "maximum_depth");
   if (!options.minimum_depth) rule.minimum_depth = std::min(rule.minimum_depth, rule.maximum_depth);
   if (!options.maximum_depth) rule.maximum_depth = std::max(rule.minimum_depth, rule.maximum_depth);
   if (rule.minimum_depth > rule.maximum_depth) throw InputError("minimum_depth", "is above maximum_depth");
@@ -48,7 +55,7 @@ DivisionRule rule_of(const ParametricOptions& options, const DensityOnSurface& d
   return rule;
 }
 
-/// The curve on one surface for one set of options, shared out in nodes.
+/// The curve on one surface for one set of options, divided into nodes.
 template <class Quad>
 class Sampling {
  public:
@@ -58,13 +65,13 @@ class Sampling {
         density_(surface, options.density),
         rule_(rule_of<Quad>(options, density_)),
         curve_(surface, density_, rule_),
-        nodes_(curve_.nodes_at(std::min(Depths<Quad>::kShared, rule_.minimum_depth))) {}
+        nodes_(curve_.nodes_at(std::min(Depths<Quad>::kNodes, rule_.minimum_depth))) {}
 
   ParametricSamples sample() {
     ParametricSamples samples;
     measure(samples);
     if (options_.dot_count == 0) return samples;
-    if (!(total() > 0)) throw InputError("density", "is zero all over the surface");
+    if (!(total() > 0)) throw InputError("density", "is zero everywhere on the surface");
     samples.dots.resize(options_.dot_count);
     if (options_.sampler == Sampler::kCentroid)
       place_centroids(samples.dots);
@@ -137,7 +144,7 @@ class Sampling {
     }
   }
 
-  /// Second walk of a node: hands on the leaves that have mass, with the mass before and after each.
+  /// Second walk of a node: visits the leaves that have mass, with the mass before and after each.
   template <class Visit>
   void walk_masses(std::size_t node, Visit&& visit) const {
     double before = mass_before_[node];
@@ -157,7 +164,7 @@ class Sampling {
 
   void place_sequence(std::vector<ParametricDot>& dots) const {
     const Sequence sequence(options_.sampler, options_.dot_count, options_.seed);
-    // The first dot whose number is at or above a mass; bisection, as the numbers rise.
+    // The first dot whose number is at or above a mass, by bisection: the numbers rise.
     const auto first_at = [&](double mass) {
       std::uint64_t low = 0, high = dots.size();
       while (low < high) {
@@ -182,7 +189,7 @@ class Sampling {
           if (++next < end) threshold = sequence.at(next) * total();
         }
       });
-      for (; next < end; ++next) dots[next].uv = place_in(last, 1);  // what rounding has left over
+      for (; next < end; ++next) dots[next].uv = place_in(last, 1);  // those that rounding put beyond the last leaf
     });
   }
 

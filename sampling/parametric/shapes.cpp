@@ -14,14 +14,14 @@ using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
 
-/// A co-ordinate that is a function of u times a function of v.
+/// A coordinate that is a function of u times a function of v.
 struct Factors {
   Jet u, v;
 };
 /// x, y and z of a surface.
 using Product = std::array<Factors, 3>;
 
-/// A surface whose co-ordinates are products: all of the thesis's but the monkey saddle.
+/// A surface whose coordinates are such products: all of the thesis's except the monkey saddle.
 template <class Shape>
 class ProductSurface final : public ParametricSurface {
  public:

@@ -28,7 +28,7 @@ DotSequence place(const SurfaceCurve& curve, const ToneField& tone, std::uint64_
   return place_dots(curve, tone, options);
 }
 
-/// Distance to the nearest dot on the same side, by looking at all of them.
+/// Distance to the nearest dot on the same side, by brute force.
 double distance_to_dots(const std::vector<Dot>& dots, const Vector3d& place, const Vector3d& normal) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const Dot& dot : dots)
@@ -90,7 +90,8 @@ TEST(FillHoles, FindsAHoleThatWasCut) {
   EXPECT_GT(largest_gap_m(mesh, dots.dots, pitch), 5 * pitch);
   const DotSequence filled = fill_holes(curve, tone, dots, 1.1);
   EXPECT_LE(largest_gap_m(mesh, filled.dots, pitch), 1.1 * pitch);
-  // Of discs of radius r no fewer than A / (2.6 r^2) cover a hole; far-apart centers leave room for 1 / (.87 r^2).
+  // At least A / (2.6 r^2) discs of radius r are needed to cover an area A; with centers at least r apart, at most
+  // A / (.87 r^2) fit.
   const double area = test::kPi * 36;
   EXPECT_GT(static_cast<double>(filled.dots.size() - left), area / 2.6 / 1.21 * .8);
   EXPECT_LT(static_cast<double>(filled.dots.size() - left), area / .87 / 1.21);
@@ -148,7 +149,7 @@ TEST(FillHoles, LightTonesHaveLargerGaps) {
   });
   // Across a gap the tone is not even: the mean over the disc may be lighter than the middle's.
   EXPECT_LT(largest, 1.1);
-  // As many new dots where it is light as where it is dark, in proportion: a tenth more, everywhere.
+  // The light and the dark part get new dots in proportion to their dots: a tenth more everywhere.
   const double added = static_cast<double>(after.dots.size() - before.dots.size());
   EXPECT_GT(added, 20);
   EXPECT_LT(added, 300);

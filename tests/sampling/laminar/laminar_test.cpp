@@ -107,7 +107,7 @@ TEST(Laminar, CountIsExact) {
     SampleReport report;
     const DotSequence dots = place_laminar(mesh, tone, with_count(count), &report);
     ASSERT_EQ(dots.dots.size(), count);
-    // pi/4 of a sphere's area is what its slices see.
+    // The slices' mass on a sphere is pi/4 of its area: the mean of the sine of the slope.
     if (count > 1000) {
       const double expected = std::sqrt(mesh.area_m2() * kPi / 4 / static_cast<double>(count));
       EXPECT_NEAR(dots.pitch_m, expected, .02 * expected);

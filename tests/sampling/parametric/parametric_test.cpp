@@ -119,8 +119,8 @@ TEST(MeasureParametric, MethodsBAndCAgreeWithTheTrueArea) {
   EXPECT_GT(plain.by_method[1] - plain.by_method[2], .01 * plain.by_method[1]);
 }
 
-/// A triangle over three vertices is half a leaf where the curve turns and nothing where it runs straight: two of five
-/// leaves' worth on the Hilbert curve, in the limit.
+/// A triangle over three vertices is half a leaf where the curve turns and nothing where it runs straight: in the limit
+/// two fifths of the area on the Hilbert curve.
 TEST(MeasureParametric, TrianglesSeeTheTurnsOfTheCurve) {
   ParametricOptions options;
   options.minimum_depth = options.maximum_depth = 6;

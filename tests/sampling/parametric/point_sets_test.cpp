@@ -38,7 +38,7 @@ TEST(PlaneSet, SobolAndNiederreiterAreNetsFromMultiplesOfTheirSize) {
 
 TEST(PlaneSet, SobolByItsPublishedFirstPoints) {
   // Joe and Kuo's table begins (1/2, 1/2), (3/4, 1/4), (1/4, 3/4), (3/8, 3/8), (7/8, 7/8), (5/8, 1/8), (1/8, 5/8);
-  // numbers 1 to 7 shifted by 128 differ in the eighth digit and the one that 128 itself brings.
+  // numbers 1 to 7 shifted by 128 differ in the eighth digit and in the digit of 128 itself.
   const auto points = plane_set(PlaneSet::kNiederreiter, 64, 1);
   const Vector2d published[] = {{.5, .5},     {.75, .25},   {.25, .75},  {.375, .375},
                                 {.875, .875}, {.625, .125}, {.125, .625}};
