@@ -30,8 +30,8 @@ void GrowingBall::begin(const Eigen::Vector3d& center_O, std::uint32_t triangle)
 
 void GrowingBall::enter(const Crossing& crossing) {
   entered_[crossing.triangle] = {crossing.radius2, round_};
-  for (int side = 0; side < 3; ++side) {
-    const std::uint32_t next = neighbors_[crossing.triangle][static_cast<std::size_t>(side)].triangle;
+  for (std::size_t side = 0; side < 3; ++side) {
+    const std::uint32_t next = neighbors_[crossing.triangle][side].triangle;
     if (next == kNoTriangle || entered_[next].round == round_) continue;
     const double radius2 = squared_distance(center_O_, mesh_.corner(crossing.triangle, side),
                                             mesh_.corner(crossing.triangle, (side + 1) % 3));

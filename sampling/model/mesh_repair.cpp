@@ -49,14 +49,13 @@ bool has_usable_corners(const TexturedMesh& mesh, std::size_t t) {
 
 /// The corner where the shortest side of a triangle begins, if that side is as good as a point compared with the
 /// longest one.
-std::optional<int> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
+std::optional<std::size_t> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
   std::array<double, 3> length2{};
-  for (int k = 0; k < 3; ++k)
-    length2[static_cast<std::size_t>(k)] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
+  for (std::size_t k = 0; k < 3; ++k) length2[k] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
   const auto shortest = std::min_element(length2.begin(), length2.end());
   const double longest2 = *std::max_element(length2.begin(), length2.end());
   if (!(*shortest > 0) || *shortest > kMinHeightRatio * kMinHeightRatio * longest2) return std::nullopt;
-  return static_cast<int>(shortest - length2.begin());
+  return static_cast<std::size_t>(shortest - length2.begin());
 }
 
 /// Gives the ends of collapsed sides one position, so that triangles that were connected by such a triangle remain
@@ -66,8 +65,7 @@ bool close_collapsed_sides(TexturedMesh& mesh) {
   bool is_any = false;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (const auto k = collapsed_side(mesh, t)) {
-      const auto i = static_cast<std::size_t>(*k);
-      positions.unite(mesh.triangles[t][i], mesh.triangles[t][(i + 1) % 3]);
+      positions.unite(mesh.triangles[t][*k], mesh.triangles[t][(*k + 1) % 3]);
       is_any = true;
     }
   if (is_any)

@@ -54,7 +54,7 @@ struct TexturedMesh {
   std::vector<Texture> textures;
 
   std::size_t triangle_count() const { return triangles.size(); }
-  const Eigen::Vector3d& corner(std::size_t t, int c) const { return vertices[triangles[t][c]]; }
+  const Eigen::Vector3d& corner(std::size_t t, std::size_t c) const { return vertices[triangles[t][c]]; }
   /// Half the cross product of two edges: area times unit normal.
   Eigen::Vector3d area_vector(std::size_t t) const {
     return .5 * (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0));

@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <initializer_list>
 
-/// What seeded campaigns share: how far they go, and what a crash says.
+/// What seeded campaigns share: settings from the environment, and the report of a crash.
 namespace hilbrush::test {
 
-/// What a signal handler may print: which mutant was being read.
+/// The seed of the mutant that is being read, for the signal handler.
 inline volatile std::uint64_t current_seed = 0;
 
 inline void report_crash(int signal) {

@@ -16,17 +16,22 @@
 
 namespace hilbrush {
 
-/// Everything that decodes what devices send, on the same bytes; aborts where a promise is broken. The bytes are cut in
-/// two where the first of them says, as a network may.
-inline void decode_as_every_device(std::string_view bytes) {
-  const auto promise = [](bool is_kept) {
-    if (!is_kept) std::abort();
-  };
-  const std::size_t cut = bytes.empty() ? 0 : static_cast<unsigned char>(bytes[0]) % (bytes.size() + 1);
+namespace device_codecs {
 
+inline void promise(bool is_kept) {
+  if (!is_kept) std::abort();
+}
+
+/// The bytes in two pieces, cut where the first byte says: a network may cut them anywhere.
+inline std::array<std::string_view, 2> in_two(std::string_view bytes) {
+  const std::size_t cut = bytes.empty() ? 0 : static_cast<unsigned char>(bytes[0]) % (bytes.size() + 1);
+  return {bytes.substr(0, cut), bytes.substr(cut)};
+}
+
+inline void decode_as_robot(std::string_view bytes) {
   dobot::FrameStream frames;
   std::size_t whole = 0;
-  for (const std::string_view piece : {bytes.substr(0, cut), bytes.substr(cut)}) {
+  for (const std::string_view piece : in_two(bytes)) {
     frames.push(piece);
     while (const auto frame = frames.next()) {
       ++whole;
@@ -37,7 +42,7 @@ inline void decode_as_every_device(std::string_view bytes) {
   promise(whole * dobot::kFrameBytes + frames.dropped_bytes() <= bytes.size());
 
   dobot::ReplyStream replies;
-  for (const std::string_view piece : {bytes.substr(0, cut), bytes.substr(cut)}) {
+  for (const std::string_view piece : in_two(bytes)) {
     replies.push(piece);
     while (const auto text = replies.next())
       if (const auto reply = dobot::decode_reply(*text)) {
@@ -45,14 +50,18 @@ inline void decode_as_every_device(std::string_view bytes) {
         promise(!dobot::error_text(reply->error).empty());
       }
   }
+}
 
+inline void decode_as_laser_head(std::string_view bytes) {
   obis::classify(bytes);
   obis::decode_switch(bytes);
   if (const auto word = obis::decode_hex_word(bytes)) obis::fault_text(*word);
   cobolt::is_ok(bytes);
   if (const auto number = line_codec::decode_number(bytes)) promise(std::isfinite(*number));
   if (const auto fault = line_codec::decode_integer(bytes)) cobolt::fault_text(*fault);
+}
 
+inline void decode_as_laser_guard(std::string_view bytes) {
   if (const auto request = guard::decode_request(bytes)) {
     const auto again = guard::decode_request(guard::encode(*request));
     promise(again && again->verb == request->verb && again->value == request->value);
@@ -73,6 +82,9 @@ inline void decode_as_every_device(std::string_view bytes) {
   } catch (const DriverError&) {
     // refused: fine
   }
+}
+
+inline void decode_as_drive(std::string_view bytes) {
   if (bytes.size() < 10) return;
   const auto word_at = [&](std::size_t i) {
     return static_cast<std::uint16_t>(static_cast<unsigned char>(bytes[i]) << 8 |
@@ -87,6 +99,16 @@ inline void decode_as_every_device(std::string_view bytes) {
   const std::int64_t value = register_map::decode(reg, std::span(position).first(2));
   promise(register_map::decode(
               reg, register_map::encode(reg, register_map::to_register(reg, static_cast<double>(value)))) == value);
+}
+
+}  // namespace device_codecs
+
+/// Runs everything that decodes what devices send on the same bytes; aborts where a promise is broken.
+inline void decode_as_every_device(std::string_view bytes) {
+  device_codecs::decode_as_robot(bytes);
+  device_codecs::decode_as_laser_head(bytes);
+  device_codecs::decode_as_laser_guard(bytes);
+  device_codecs::decode_as_drive(bytes);
 }
 
 }  // namespace hilbrush

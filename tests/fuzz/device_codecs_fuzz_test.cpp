@@ -9,7 +9,7 @@
 #include "tests/fuzz/device_codecs.h"
 #include "tests/fuzz/mutator.h"
 
-/// Seeded mutants of what devices say. HILBRUSH_FUZZ_INPUTS runs so many, HILBRUSH_FUZZ_SEED sets where they start.
+/// Seeded mutants of what devices send. HILBRUSH_FUZZ_INPUTS is their number, HILBRUSH_FUZZ_SEED the first seed.
 namespace hilbrush {
 namespace {
 
@@ -43,7 +43,7 @@ TEST(DeviceCodecsFuzz, MutantsOfTranscriptsAreReadOrRefused) {
   Mutator mutator(inputs);
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     current_seed = seed;
-    // Short: the readers' own limits are met by the corpus and by joining pieces of it.
+    // Short is enough: the corpus and joined pieces of it exceed the readers' own limits.
     decode_as_every_device(mutator.mutate(inputs[seed % inputs.size()], seed).substr(0, 1 << 14));
   }
 }

@@ -17,8 +17,8 @@
 #include "tests/fuzz/playground.h"
 
 /// Seeded mutants of the corpus, read as an operator's files would be. None may crash, take more than 5 s, need more
-/// than 1 GB, or make the readers open a file outside the model's folder. HILBRUSH_FUZZ_INPUTS=20000 runs so many,
-/// HILBRUSH_FUZZ_SEED sets where they start.
+/// than 1 GB, or make the readers open a file outside the model's folder. HILBRUSH_FUZZ_INPUTS is the number of
+/// mutants, HILBRUSH_FUZZ_SEED the first seed.
 namespace hilbrush {
 namespace {
 
@@ -35,7 +35,7 @@ constexpr bool kIsSanitized = false;
 
 using Clock = std::chrono::steady_clock;
 
-/// Nothing here waits, so the processor's time is the operator's on an idle machine, and the same on a busy one.
+/// Processor time: nothing here waits, so it is what an operator would wait on an idle machine, even on a busy one.
 double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
@@ -62,7 +62,8 @@ void run_campaign(const std::map<std::string, std::string>& seeds, double slice_
   Mutator mutator(donors);
   const auto start = Clock::now();
   double slowest_s = 0;
-  std::uint64_t count = 0, slowest_seed = 0;
+  std::uint64_t count = 0;
+  std::uint64_t slowest_seed = 0;
   for (;; ++count) {
     if (wanted ? count >= wanted
                : count >= 2000 || std::chrono::duration<double>(Clock::now() - start).count() > slice_s)
@@ -72,7 +73,7 @@ void run_campaign(const std::map<std::string, std::string>& seeds, double slice_
     auto pick = seeds.begin();
     std::advance(pick, static_cast<std::ptrdiff_t>(seed % seeds.size()));
     const std::string mutant = mutator.mutate(pick->second, seed);
-    alarm(kIsSanitized ? 600 : 120);  // what sleeps for ever ends here, with its seed
+    alarm(kIsSanitized ? 600 : 120);  // a reader that sleeps forever is killed, and its seed printed
     const double begin_s = cpu_s();
     read("mutant" + fs::path(pick->first).extension().string(), mutant, seed);
     const double took_s = cpu_s() - begin_s;
@@ -91,7 +92,7 @@ void run_campaign(const std::map<std::string, std::string>& seeds, double slice_
   EXPECT_GT(count, 0u);
 }
 
-/// A mesh that a reader hands over is one that the rest of the house can use.
+/// Checks what every later stage relies on.
 void expect_sound(const TexturedMesh& mesh, std::uint64_t seed) {
   const std::size_t count = mesh.triangle_count();
   ASSERT_GT(count, 0u) << "seed " << seed;
@@ -113,7 +114,7 @@ void expect_sound(const TexturedMesh& mesh, std::uint64_t seed) {
 
 TEST(ModelFuzz, MutatedModelsNeitherCrashNorHangNorReadOutsideTheirFolder) {
   const Playground playground;
-  (void)load_image_file(playground.folder() / "gradient.png", 1 << 20);  // OpenImageIO opens its own files now
+  (void)load_image_file(playground.folder() / "gradient.png", 1 << 20);  // so that OpenImageIO opens its own files now
   std::size_t read_count = 0;
   run_campaign(playground.models(), 25, [&](const std::string& name, const std::string& mutant, std::uint64_t seed) {
     const fs::path file = playground.write(name, mutant);

@@ -73,9 +73,10 @@ bool is_word_byte(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' || c == '-' || c == '_';
 }
 
-/// The run of word bytes around a place.
-std::pair<std::size_t, std::size_t> word_around(const std::string& text, std::size_t place) {
-  std::size_t begin = place, end = place;
+/// The run of word bytes around a position: where it begins, and its length.
+std::pair<std::size_t, std::size_t> word_around(const std::string& text, std::size_t position) {
+  std::size_t begin = position;
+  std::size_t end = position;
   while (begin > 0 && is_word_byte(text[begin - 1])) --begin;
   while (end < text.size() && is_word_byte(text[end])) ++end;
   return {begin, end - begin};
@@ -95,19 +96,19 @@ std::string Mutator::mutate(std::string input, std::uint64_t seed) {
 
 void Mutator::mutate_once(std::string& text) {
   if (text.empty()) text = " ";
-  const std::size_t place = below(text.size());
+  const std::size_t position = below(text.size());
   switch (below(12)) {
     case 0:
-      text[place] = static_cast<char>(text[place] ^ (1 << below(8)));
+      text[position] = static_cast<char>(text[position] ^ (1 << below(8)));
       break;
     case 1:
-      text[place] = static_cast<char>(below(256));
+      text[position] = static_cast<char>(below(256));
       break;
     case 2:
-      text.erase(place, 1 + below(32));
+      text.erase(position, 1 + below(32));
       break;
     case 3:
-      text.resize(place);
+      text.resize(position);
       break;
     case 4:
     case 5:
@@ -122,12 +123,12 @@ void Mutator::mutate_once(std::string& text) {
     case 10:
       return nest(text);
     default:
-      text.insert(place, std::string(1 + below(64), static_cast<char>(below(256))));
+      text.insert(position, std::string(1 + below(64), static_cast<char>(below(256))));
   }
 }
 
 void Mutator::replace_number(std::string& text) {
-  // Looks for a digit from a random place on.
+  // Looks for a digit from a random position on.
   const std::size_t digit = text.find_first_of("0123456789", below(text.size()));
   if (digit == text.npos) return;
   const auto [begin, length] = word_around(text, digit);
@@ -154,9 +155,9 @@ void Mutator::splice(std::string& text) {
   text.insert(below(text.size()), donor.substr(from, 1 + below(400)));
 }
 
-/// Depth, and the doublings that turn a small file into an endless one.
+/// Deep nesting, or repeated doubling by USE, which makes a small file expand without end.
 void Mutator::nest(std::string& text) {
-  const std::size_t place = below(text.size());
+  const std::size_t position = below(text.size());
   std::string block;
   const std::size_t depth = 1 + below(200);
   if (below(2)) {
@@ -170,7 +171,7 @@ void Mutator::nest(std::string& text) {
       block += "DEF L" + std::to_string(i) + " Group { children [ " + inner + inner + "] } ";
     }
   }
-  text.insert(place, block);
+  text.insert(position, block);
 }
 
 }  // namespace hilbrush

@@ -6,8 +6,8 @@
 
 namespace hilbrush {
 
-/// Damages files the way bad disks, careless exporters and ill-meaning people do: bits, bytes, numbers, words, lines
-/// and blocks, cut, copied, swapped and mixed with other files. The same seed makes the same bytes on every machine.
+/// Damages files the way bad disks, careless exporters and attackers do: bits, bytes, numbers, words and blocks are
+/// changed, cut, copied and mixed with other files. The same seed makes the same bytes on every machine.
 class Mutator {
  public:
   /// @param donors  files to take pieces from

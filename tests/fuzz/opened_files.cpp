@@ -16,8 +16,9 @@ int name_count = 0;
 char opened_names[kNameLimit][kNameLength];
 
 void note(const char* name) {
-  if (is_watching && name && name_count < kNameLimit)
-    std::snprintf(opened_names[name_count++], kNameLength, "%s", name);
+  if (!is_watching || !name || name_count >= kNameLimit) return;
+  std::snprintf(opened_names[name_count], kNameLength, "%s", name);
+  ++name_count;
 }
 
 template <class Function>

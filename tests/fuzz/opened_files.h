@@ -4,8 +4,8 @@
 
 namespace hilbrush {
 
-/// Watches which files this process opens, by standing in for the C library's open and fopen; so it sees other
-/// libraries' opens as well. Names are kept from construction to `names()`. One at a time, one thread.
+/// Records which files this process opens. It replaces the C library's open and fopen, so the calls of all libraries
+/// are recorded. Names are kept from construction to `names()`. One object at a time, in one thread.
 class OpenedFiles {
  public:
   OpenedFiles();

@@ -15,11 +15,11 @@
 
 namespace hilbrush {
 
-/// A folder for mutants to run in, beside everything they might reach for: the corpus and images inside it, tempting
-/// files and links that lead out of it around it. Removed at the end.
+/// A folder to read mutants in, with everything that they may name: the corpus, images and links that lead out of it
+/// inside, and files outside that must not be read. Removed at the end.
 class Playground {
  public:
-  /// @throws std::filesystem::filesystem_error if it can't be made
+  /// @throws std::filesystem::filesystem_error if it cannot be made
   Playground();
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -35,7 +35,8 @@ class Playground {
  private:
   testing_support::TemporaryFolder outer_;
   const std::filesystem::path folder_ = outer_ / "model";
-  std::map<std::string, std::string> models_, images_;
+  std::map<std::string, std::string> models_;
+  std::map<std::string, std::string> images_;
 };
 
 namespace playground {
@@ -89,10 +90,10 @@ inline std::string gif() {
 
 }  // namespace playground
 
-/// The whole file. @throws std::runtime_error if it can't be read.
+/// The whole file. @throws std::runtime_error if it cannot be read.
 inline std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error("can't read " + file.string());
+  if (!in) throw std::runtime_error("cannot read " + file.string());
   return {std::istreambuf_iterator<char>(in), {}};
 }
 

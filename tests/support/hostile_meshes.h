@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-/// Meshes that break samplers, by name: each stands for one repair or one way of cutting and mapping. Meters.
+/// Meshes that break samplers, by name: each needs one repair or one case of cutting and mapping. Meters.
 namespace hilbrush::test {
 
 /// Two squares that touch in a corner.
@@ -21,7 +21,10 @@ inline TexturedMesh klein_bottle(int nu = 60, int nv = 24) {
   TexturedMesh mesh = grid(
       nu, nv,
       [](double u, double v) {
-        const double turn = 2 * kPi * u, a = 2 * kPi * v, c = std::cos(turn / 2), s = std::sin(turn / 2);
+        const double turn = 2 * kPi * u;
+        const double a = 2 * kPi * v;
+        const double c = std::cos(turn / 2);
+        const double s = std::sin(turn / 2);
         const double r = .025 + .01 * (c * std::sin(a) - s * std::sin(2 * a));
         return Eigen::Vector3d(r * std::cos(turn), r * std::sin(turn), .01 * (s * std::sin(a) + c * std::sin(2 * a)));
       },
@@ -43,7 +46,7 @@ inline TexturedMesh needle_fan(int count = 2000) {
   return finish(std::move(mesh));
 }
 
-/// A cube of which every triangle is there twice, the second time upside down.
+/// A cube with every triangle twice, the second time upside down.
 inline TexturedMesh duplicate_faces() {
   TexturedMesh mesh = cube();
   for (std::size_t t = 0; t < 12; ++t) {
@@ -53,7 +56,7 @@ inline TexturedMesh duplicate_faces() {
   return finish(std::move(mesh));
 }
 
-/// Two squares of one side beside one of twice as much: the long edge has a vertex in the middle on one side only.
+/// Two squares beside one with sides twice as long, whose edge has a vertex in the middle on one side only.
 inline TexturedMesh t_junction() {
   TexturedMesh mesh;
   mesh.vertices = {{0, 0, 0},   {.04, 0, 0},   {.04, .04, 0}, {0, .04, 0},
@@ -83,7 +86,7 @@ inline TexturedMesh three_pages() {
   return finish(std::move(mesh));
 }
 
-/// A torus of which one meridian has shrunk to a point: a sphere that touches itself.
+/// A torus with one meridian shrunk to a point: a sphere that touches itself.
 inline TexturedMesh pinched_torus() {
   TexturedMesh mesh = torus(.025, .01, 48, 24);
   for (auto& p : mesh.vertices)
@@ -91,7 +94,7 @@ inline TexturedMesh pinched_torus() {
   return mesh;
 }
 
-/// The surface of unit cubes at the given places, shared vertices shared.
+/// The surface of cubes at the given positions on a grid; common vertices are shared.
 inline TexturedMesh voxels(const std::set<std::array<int, 3>>& cubes, double side_m = .01) {
   TexturedMesh mesh;
   std::map<std::array<int, 3>, std::uint32_t> index;
@@ -100,15 +103,15 @@ inline TexturedMesh voxels(const std::set<std::array<int, 3>>& cubes, double sid
     if (is_new) mesh.vertices.emplace_back(side_m * p[0], side_m * p[1], side_m * p[2]);
     return at->second;
   };
-  for (const auto& place : cubes)
+  for (const auto& position : cubes)
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (const int side : {0, 1}) {
-        auto beside = place;
+        auto beside = position;
         beside[axis] += side ? 1 : -1;
         if (cubes.contains(beside)) continue;
         std::array<std::uint32_t, 4> corners{};
         for (std::size_t k = 0; k < 4; ++k) {
-          auto p = place;
+          auto p = position;
           p[axis] += side;
           p[(axis + 1) % 3] += k == 1 || k == 2;
           p[(axis + 2) % 3] += k >= 2;
@@ -119,7 +122,7 @@ inline TexturedMesh voxels(const std::set<std::array<int, 3>>& cubes, double sid
   return finish(std::move(mesh));
 }
 
-/// A plate with `holes` square holes in a row: so many handles.
+/// A plate with `holes` square holes in a row: a surface of that genus.
 inline TexturedMesh holed_plate(int holes) {
   std::set<std::array<int, 3>> cubes;
   for (int i = 0; i < 2 * holes + 1; ++i)
@@ -131,7 +134,7 @@ inline TexturedMesh double_torus() {
   return holed_plate(2);
 }
 
-/// Triangles of which the largest has a million times the area of the smallest.
+/// The largest triangle has a million times the area of the smallest.
 inline TexturedMesh sliver_1e6() {
   const auto stretched = [](double u) {
     return .05 * std::expm1(std::log(1e3) * 31. / 30 * u) / std::expm1(std::log(1e3) * 31. / 30);
@@ -150,7 +153,7 @@ inline TexturedMesh many_holes(int n = 9) {
   });
 }
 
-/// A polygon cut into ears: every inner edge joins two vertices of the boundary.
+/// A polygon cut into ears: every inner edge connects two vertices of the boundary.
 inline TexturedMesh chord_trap(std::uint32_t corners = 24) {
   TexturedMesh mesh;
   for (std::uint32_t i = 0; i < corners; ++i)
@@ -173,7 +176,7 @@ inline TexturedMesh single_triangle() {
   return finish(std::move(mesh));
 }
 
-/// A sphere whose pole is a ring of vertices that only rounding sets apart.
+/// A sphere whose pole is a ring of vertices that differ only by rounding.
 inline TexturedMesh frayed_pole() {
   return grid(
       48, 24,
@@ -190,8 +193,10 @@ inline TexturedMesh long_finger() {
   return grid(
       24, 400,
       [](double u, double v) {
-        const double turn = 2 * kPi * u, way = .1 * v;
-        const double r = way < .02 ? .021 - way : .001, z = std::max(0., way - .02);
+        const double turn = 2 * kPi * u;
+        const double along_m = .1 * v;
+        const double r = along_m < .02 ? .021 - along_m : .001;
+        const double z = std::max(0., along_m - .02);
         return Eigen::Vector3d(r * std::cos(turn), r * std::sin(turn), z);
       },
       true);
@@ -202,7 +207,7 @@ inline TexturedMesh bag() {
   return without_triangles(sphere(.025, 96, 48), [](const Eigen::Vector3d& p) { return p.z() > .0249; });
 }
 
-/// So many triangles that nothing joins, on a square.
+/// A square of n by n triangles that are not connected.
 inline TexturedMesh specks(int n = 100) {
   TexturedMesh mesh;
   const double step = .05 / n;

@@ -11,7 +11,7 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// Meshes that tests ask for by name: plain ones, and awkward ones. Meters; about 50 mm large.
+/// Meshes for tests, by name: plain ones, and awkward ones. Meters; about 50 mm large.
 namespace hilbrush::test {
 
 inline constexpr double kPi = std::numbers::pi;
@@ -35,20 +35,23 @@ inline void add_quad(TexturedMesh& mesh, std::uint32_t a, std::uint32_t b, std::
   mesh.triangles.push_back({a, c, d});
 }
 
-/// A grid of nu by nv quads over place(u, v), u and v in [0, 1]; closed in u if asked. Corner uv are (u, v).
-inline TexturedMesh grid(int nu, int nv, const std::function<Eigen::Vector3d(double, double)>& place,
+/// A grid of nu by nv quads over position(u, v), u and v in [0, 1], closed in u or v if set. Corner uv are (u, v).
+inline TexturedMesh grid(int nu, int nv, const std::function<Eigen::Vector3d(double, double)>& position,
                          bool closes_u = false, bool closes_v = false) {
   TexturedMesh mesh;
-  const int columns = closes_u ? nu : nu + 1, rows = closes_v ? nv : nv + 1;
+  const int columns = closes_u ? nu : nu + 1;
+  const int rows = closes_v ? nv : nv + 1;
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i)
-      mesh.vertices.push_back(place(static_cast<double>(i) / nu, static_cast<double>(j) / nv));
+      mesh.vertices.push_back(position(static_cast<double>(i) / nu, static_cast<double>(j) / nv));
   const auto index = [&](int i, int j) { return static_cast<std::uint32_t>(j % rows * columns + i % columns); };
   for (int j = 0; j < nv; ++j)
     for (int i = 0; i < nu; ++i) {
       add_quad(mesh, index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
-      const double u0 = static_cast<double>(i) / nu, u1 = (i + 1.) / nu, v0 = static_cast<double>(j) / nv,
-                   v1 = (j + 1.) / nv;
+      const double u0 = static_cast<double>(i) / nu;
+      const double u1 = (i + 1.) / nu;
+      const double v0 = static_cast<double>(j) / nv;
+      const double v1 = (j + 1.) / nv;
       mesh.corner_uv.push_back({Eigen::Vector2d(u0, v0), Eigen::Vector2d(u1, v0), Eigen::Vector2d(u1, v1)});
       mesh.corner_uv.push_back({Eigen::Vector2d(u0, v0), Eigen::Vector2d(u1, v1), Eigen::Vector2d(u0, v1)});
     }
@@ -62,7 +65,8 @@ inline TexturedMesh rectangle(double width_m, double height_m, int nu, int nv) {
 /// A sheet 2 by 1 sides large, folded along its middle, the y axis: `angle` between its halves, the lower one on z = 0.
 inline TexturedMesh folded_sheet(double side_m, double angle, int nu, int nv) {
   return grid(2 * nu, nv, [=](double u, double v) {
-    const double along = (2 * u - 1) * side_m, y = v * side_m;
+    const double along = (2 * u - 1) * side_m;
+    const double y = v * side_m;
     return along < 0 ? Eigen::Vector3d(-along, y, 0)
                      : Eigen::Vector3d(along * std::cos(angle), y, along * std::sin(angle));
   });
@@ -73,7 +77,8 @@ inline TexturedMesh sphere(double radius_m, int nu = 48, int nv = 24) {
   mesh.vertices.emplace_back(0, 0, -radius_m);
   for (int j = 1; j < nv; ++j)
     for (int i = 0; i < nu; ++i) {
-      const double polar = kPi * j / nv, turn = 2 * kPi * i / nu;
+      const double polar = kPi * j / nv;
+      const double turn = 2 * kPi * i / nu;
       mesh.vertices.emplace_back(radius_m * std::sin(polar) * std::cos(turn),
                                  radius_m * std::sin(polar) * std::sin(turn), -radius_m * std::cos(polar));
     }
@@ -117,7 +122,9 @@ inline TexturedMesh even_cylinder() {
 
 inline TexturedMesh moebius_strip(int nu = 60) {
   TexturedMesh mesh = grid(nu, 2, [](double u, double v) {
-    const double turn = 2 * kPi * u, across = (v - .5) * .012, r = .02 + across * std::cos(turn / 2);
+    const double turn = 2 * kPi * u;
+    const double across = (v - .5) * .012;
+    const double r = .02 + across * std::cos(turn / 2);
     return Eigen::Vector3d(r * std::cos(turn), r * std::sin(turn), across * std::sin(turn / 2));
   });
   // The last column lies on the first one, upside down.
@@ -143,7 +150,10 @@ inline TexturedMesh cube(double side_m = .04) {
 inline TexturedMesh without_triangles(const TexturedMesh& mesh,
                                       const std::function<bool(const Eigen::Vector3d&)>& is_dropped) {
   TexturedMesh kept = mesh;
-  kept.triangles.clear(), kept.corner_uv.clear(), kept.corner_luminance.clear(), kept.material_index.clear();
+  kept.triangles.clear();
+  kept.corner_uv.clear();
+  kept.corner_luminance.clear();
+  kept.material_index.clear();
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
     if (is_dropped((mesh.corner(t, 0) + mesh.corner(t, 1) + mesh.corner(t, 2)) / 3)) continue;
     kept.triangles.push_back(mesh.triangles[t]);

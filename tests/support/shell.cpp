@@ -10,7 +10,7 @@ namespace hilbrush::testing_support {
 CommandResult run_command(const std::string& command) {
   CommandResult result;
   FILE* pipe = popen(("( " + command + " ) 2>&1").c_str(), "r");
-  if (!pipe) throw std::runtime_error("can't run " + command);
+  if (!pipe) throw std::runtime_error("cannot run " + command);
   std::array<char, 4096> buffer;
   while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
     result.output.append(buffer.data(), count);

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-/// What tests need of the system around them.
+/// Shell commands for tests.
 namespace hilbrush::testing_support {
 
 struct CommandResult {

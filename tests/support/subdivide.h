@@ -12,7 +12,9 @@ namespace hilbrush::test {
 
 /// Puts a vertex in the middle of an edge: each triangle at it becomes two.
 inline void halve_side(TexturedMesh& mesh, TriangleSide at, std::uint32_t middle) {
-  const std::size_t t = at.triangle, i = at.side, j = (i + 1) % 3;
+  const std::size_t t = at.triangle;
+  const std::size_t i = at.side;
+  const std::size_t j = (i + 1) % 3;
   mesh.triangles.push_back(mesh.triangles[t]);
   mesh.corner_uv.push_back(mesh.corner_uv[t]);
   mesh.corner_luminance.push_back(mesh.corner_luminance[t]);

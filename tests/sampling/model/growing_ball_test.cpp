@@ -15,9 +15,9 @@ using Eigen::Vector3d;
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-double distance_to(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& place) {
-  const auto b = nearest_in_triangle(place, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2));
-  return (position(mesh, {t, b}) - place).norm();
+double distance_to(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& point) {
+  const auto b = nearest_in_triangle(point, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2));
+  return (position(mesh, {t, b}) - point).norm();
 }
 
 TEST(GrowingBall, OnAPlateTrianglesAreAsFarAsTheyLook) {
@@ -57,7 +57,8 @@ TEST(GrowingBall, EndsAtItsLimitAndAtTheComponent) {
   const TexturedMesh one = test::rectangle(.05, .05, 10, 10);
   const TexturedMesh mesh = test::both(one, one, {0, 0, .001});
   const Neighbors neighbors = find_neighbors(mesh.triangles);
-  const auto last = static_cast<std::uint32_t>(one.triangle_count() - 1), above = last + 1;
+  const auto last = static_cast<std::uint32_t>(one.triangle_count() - 1);
+  const std::uint32_t above = last + 1;
   GrowingBall ball(mesh, neighbors);
   ball.begin(mesh.corner(0, 0), 0);
   EXPECT_EQ(ball.entry2(0, 1e-9), 0);

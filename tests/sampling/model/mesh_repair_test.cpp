@@ -24,7 +24,7 @@ double volume(const TexturedMesh& mesh) {
   return sum;
 }
 
-/// Every edge one or two triangles that run alike, every vertex one fan.
+/// Every edge has one or two triangles, every vertex one fan.
 void expect_manifold(const TexturedMesh& mesh) {
   for (const EdgeGroup& group : edge_table(mesh.triangles).groups) EXPECT_LE(group.end - group.begin, 2u);
   const Neighbors neighbors = find_neighbors(mesh.triangles);
@@ -92,7 +92,7 @@ TEST(MeshRepair, OrientsClosedPartsOutwardsAndOpenOnesByMajority) {
   EXPECT_EQ(count_of(repaired, "triangles turned over"), 3u);
   for (std::size_t t = 0; t < repaired.mesh.triangle_count(); ++t) {
     EXPECT_GT(repaired.mesh.area_vector(t).z(), 0);
-    // The corners' uv went with them: here uv is the place itself.
+    // The corners' uv went with them: here uv is the position itself.
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(
           (repaired.mesh.corner_uv[t][static_cast<std::size_t>(c)] * .05 - repaired.mesh.corner(t, c).head<2>()).norm(),

@@ -96,7 +96,7 @@ TEST(ModelFile, SharesTexturesAndCountsTheirPixels) {
   EXPECT_EQ(limits_seen, (std::vector<std::size_t>{5, 3}));
 }
 
-/// Facts about models of the wild; HILBRUSH_TEST_MODELS names the folder they are in.
+/// Facts about published models; HILBRUSH_TEST_MODELS names the folder they are in.
 class RealModels : public testing::Test {
  protected:
   void SetUp() override {
@@ -143,7 +143,8 @@ TEST_F(RealModels, HoldWhatTheyAreKnownToHold) {
 
 TEST_F(RealModels, AreReadOrRefusedWithAReason) {
   const std::set<std::string> endings{".wrl", ".WRL", ".obj", ".ply", ".off", ".stl", ".STL"};
-  std::size_t read = 0, refused = 0;
+  std::size_t read = 0;
+  std::size_t refused = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
     if (!endings.count(entry.path().extension().string())) continue;
     try {

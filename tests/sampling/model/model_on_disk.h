@@ -9,7 +9,7 @@
 /// Models that tests write themselves.
 namespace hilbrush {
 
-/// A folder of the test's own, gone at its end.
+/// A folder of the test's own, removed at its end.
 class ModelOnDisk {
  public:
   ModelOnDisk() { std::filesystem::create_directories(folder()); }
@@ -26,7 +26,7 @@ class ModelOnDisk {
   Model load_vrml(const std::string& body, const ModelLimits& limits = {}) const {
     return load("model.wrl", "#VRML V2.0 utf8\n" + body, limits);
   }
-  /// The sentence of the refusal, with its place; empty if the model was read.
+  /// The message of the refusal, with file and line; empty if the model was read.
   std::string refusal(const std::string& name, const std::string& bytes, const ModelLimits& limits = {}) const {
     try {
       load(name, bytes, limits);
@@ -72,18 +72,18 @@ inline bool warns(const Model& model, const std::string& words) {
   return false;
 }
 
-/// The texture coordinates at a place of the surface; those of the nearest triangle whose plane holds it.
-inline Eigen::Vector2d uv_at(const TexturedMesh& mesh, const Eigen::Vector3d& place) {
+/// The texture coordinates at a point of the surface: those of the nearest triangle whose plane contains it.
+inline Eigen::Vector2d uv_at(const TexturedMesh& mesh, const Eigen::Vector3d& point) {
   double nearest = 1e300;
   Eigen::Vector2d found(-1e9, -1e9);
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
     const Eigen::Vector3d normal = mesh.area_vector(t);
     Eigen::Vector3d b;
     for (int c = 0; c < 3; ++c)
-      b[c] = .5 * (mesh.corner(t, (c + 1) % 3) - place).cross(mesh.corner(t, (c + 2) % 3) - place).dot(normal) /
+      b[c] = .5 * (mesh.corner(t, (c + 1) % 3) - point).cross(mesh.corner(t, (c + 2) % 3) - point).dot(normal) /
              normal.squaredNorm();
     const double distance =
-        std::abs((place - mesh.corner(t, 0)).dot(normal.normalized())) + 10 * std::max(0., -b.minCoeff());
+        std::abs((point - mesh.corner(t, 0)).dot(normal.normalized())) + 10 * std::max(0., -b.minCoeff());
     if (distance >= nearest) continue;
     nearest = distance;
     found = b[0] * mesh.corner_uv[t][0] + b[1] * mesh.corner_uv[t][1] + b[2] * mesh.corner_uv[t][2];

@@ -46,7 +46,7 @@ TEST(Placement, ScalesTheLongestSide) {
   EXPECT_NEAR((high - low).maxCoeff(), .08, 1e-12);
 }
 
-TEST(Placement, TakesTheUpAxisItIsTold) {
+TEST(Placement, UsesTheUpAxisThatIsGiven) {
   const TexturedMesh mesh = place_on_table(slanted(), {.unit_m = .001, .up = UpAxis::kZ});
   EXPECT_NEAR(bounds(mesh)[1].z(), .004, 1e-12);
 }

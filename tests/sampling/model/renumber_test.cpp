@@ -36,7 +36,7 @@ auto contents(const TexturedMesh& mesh) {
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
     std::array<Corner, 3> corners;
     for (std::size_t c = 0; c < 3; ++c) {
-      const Eigen::Vector3d p = mesh.corner(t, static_cast<int>(c));
+      const Eigen::Vector3d p = mesh.corner(t, c);
       const Eigen::Vector2d uv = mesh.corner_uv[t][c];
       corners[c] = {p.x(), p.y(), p.z(), uv.x(), uv.y(), mesh.corner_luminance[t][c]};
     }
@@ -49,7 +49,8 @@ auto contents(const TexturedMesh& mesh) {
 /// Mean of how far apart the numbers of neighbors are.
 double mean_gap(const TexturedMesh& mesh) {
   const Neighbors neighbors = find_neighbors(mesh.triangles);
-  double sum = 0, count = 0;
+  double sum = 0;
+  double count = 0;
   for (std::uint32_t t = 0; t < neighbors.size(); ++t)
     for (const TriangleSide other : neighbors[t])
       if (other != kNoSide) {

@@ -221,7 +221,8 @@ TEST(StlFile, ReadsTextAndBinaryThatBeginsLikeText) {
             "m.stl:4: expected three coordinates after vertex");
   EXPECT_EQ(disk.refusal("m.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\nendloop\n"),
             "m.stl:5: a facet has 1 corners, not three");
-  const std::array<float, 9> triangle{0, 0, 0, 1, 0, 0, 0, 1, 0}, other{0, 0, 1, 1, 0, 1, 0, 1, 1};
+  const std::array<float, 9> triangle{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::array<float, 9> other{0, 0, 1, 1, 0, 1, 0, 1, 1};
   std::array<float, 9> bad = other;
   bad[4] = std::numeric_limits<float>::quiet_NaN();
   const Model model = disk.load("m.stl", binary_stl(3, {triangle, bad, other}));

@@ -259,7 +259,8 @@ TEST(VrmlSurfaces, ExtrusionWrapsItsTextureAroundAndCutsItForTheCaps) {
 
 TEST(VrmlGroups, ChooseWhatTheyShow) {
   const ModelOnDisk disk;
-  const std::string small = shape("Box { size 1 1 1 }"), large = shape("Box { size 2 2 2 }");
+  const std::string small = shape("Box { size 1 1 1 }");
+  const std::string large = shape("Box { size 2 2 2 }");
   const auto volume = [&](const std::string& body) { return signed_volume(disk.load_vrml(body).mesh); };
   EXPECT_NEAR(volume("Switch { whichChoice 1 choice [ " + small + large + "] }"), 8, 1e-12);
   EXPECT_NEAR(volume("LOD { level [ " + small + large + "] }"), 1, 1e-12);
@@ -272,7 +273,8 @@ TEST(VrmlGroups, ChooseWhatTheyShow) {
 
 TEST(VrmlNames, DefUseRedefinitionAndCycles) {
   const ModelOnDisk disk;
-  const std::string one = "DEF A " + shape("Box { size 1 1 1 }"), two = "DEF A " + shape("Box { size 2 2 2 }");
+  const std::string one = "DEF A " + shape("Box { size 1 1 1 }");
+  const std::string two = "DEF A " + shape("Box { size 2 2 2 }");
   EXPECT_NEAR(signed_volume(disk.load_vrml(one + "USE A " + two + "USE A").mesh), 1 + 1 + 8 + 8, 1e-12);
   EXPECT_NE(disk.vrml_refusal("DEF A Group { children [\n USE A ] }").find("model.wrl:3: USE A inside its own DEF"),
             std::string::npos);
@@ -335,9 +337,11 @@ TEST(VrmlHeader, MayBeMissingOddOrMarked) {
 
 TEST(VrmlLimits, EndWhatWouldNotEnd) {
   const ModelOnDisk disk;
-  std::string laughs = "DEF L0 Group { }\n", protos = "PROTO P0 [ ] { Group { } }\n";
+  std::string laughs = "DEF L0 Group { }\n";
+  std::string protos = "PROTO P0 [ ] { Group { } }\n";
   for (int i = 1; i < 40; ++i) {
-    const std::string n = std::to_string(i), p = std::to_string(i - 1);
+    const std::string n = std::to_string(i);
+    const std::string p = std::to_string(i - 1);
     laughs += "DEF L" + n + " Group { children [ USE L" + p + " USE L" + p + " ] }\n";
     protos += "PROTO P" + n + " [ ] { Group { children [ P" + p + " { } P" + p + " { } ] } }\n";
   }
