@@ -12,21 +12,24 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::size_t kMaxFaces = 8;
-/// A quad with no more than a small share of a mean triangle's area may hold as many: around a vertex with many
-/// triangles, and along needles, division would not end by itself.
+/// A quad with at most kSmallShare of a mean triangle's area may hold this many: around a vertex with many triangles,
+/// and along needles, division would not end by itself.
 constexpr std::size_t kMaxFacesIfSmall = 64;
 constexpr double kSmallShare = .25;
-/// No quad holds more than one part in so many of the mesh's area, however few its triangles: threads and strata find
-/// their way from base quads, and the walk to a place below one stays short.
+/// No quad holds more than 1/kMinQuads of the mesh's area, however few its triangles: threads and strata start from
+/// base quads, and the walk from one down to a patch stays short.
 constexpr double kMinQuads = 4000;
-/// Division also ends where it would multiply the listed triangles by more than this power of a quad's side: 1.9 with
-/// four children.
+/// Division also ends where it would multiply the listed triangles by more than kSide to this power: by 1.9 with four
+/// children.
 constexpr double kTooManyExponent = .926;
-constexpr int kDeepest = 24;
-constexpr double kCubeMargin = 1.05, kCubeMiddle = .4871828;
-/// A sound map lists each face in a few quads.
-constexpr std::size_t kMaxListed = 1'000'000, kMaxListedPerFace = 60;
-/// Rounding may not lose a triangle that touches a quad.
+constexpr int kMaxDepth = 24;
+/// The first cube is larger than the box around the faces, and off its middle by an irregular share.
+constexpr double kCubeMargin = 1.05;
+constexpr double kCubeMiddle = .4871828;
+/// A good map lists each face in a few quads only. Beyond these limits the map is too sheared.
+constexpr std::size_t kMaxListed = 1'000'000;
+constexpr std::size_t kMaxListedPerFace = 60;
+/// In units of the square: what rounding may move an edge by. A triangle that touches a quad must not be lost.
 constexpr double kTouch = 1e-14;
 
 /// Builds the base tree of one chart for one kind of curve.
@@ -54,8 +57,11 @@ class TreeBuilder {
     for (std::uint32_t f = 0; f < all.size(); ++f) all[f] = f;
     if constexpr (kDimensions == 3) {
       Place low = Place::Constant(std::numeric_limits<double>::infinity()), high = -low;
-      for (const Face& face : faces_) low = low.cwiseMin(face.low), high = high.cwiseMax(face.high);
-      // Off the middle, so that no flat part lies on the plane between two cubes and counts in both.
+      for (const Face& face : faces_) {
+        low = low.cwiseMin(face.low);
+        high = high.cwiseMax(face.high);
+      }
+      // Off the middle: else a flat part may lie exactly between two cubes and count in both.
       const double size = (high - low).maxCoeff() * kCubeMargin;
       divide(.5 * (low + high) - Place::Constant(kCubeMiddle * size), size, Curve{}, 0, all);
     } else {
@@ -114,7 +120,7 @@ class TreeBuilder {
     }
   }
 
-  /// No less than what the box holds.
+  /// At least the area that the box holds.
   double area_bound(const std::vector<std::uint32_t>& list, double size) const {
     double area = 0, density = 0;
     for (const auto f : list) {
@@ -125,7 +131,7 @@ class TreeBuilder {
   }
 
   bool is_leaf(const std::vector<std::uint32_t>& list, double size, int depth) const {
-    if (depth == kDeepest) return true;
+    if (depth == kMaxDepth) return true;
     if (list.size() > kMaxFacesIfSmall) return false;
     return area_bound(list, size) <= (list.size() <= kMaxFaces ? large_area_ : std::min(small_area_, large_area_));
   }
@@ -151,9 +157,9 @@ class TreeBuilder {
     chart_.base_quads.push_back(quad);
   }
 
-  static Place child_low(const Place& low, double size, unsigned place) {
+  static Place child_low(const Place& low, double size, unsigned slot) {
     Place result = low;
-    for (int k = 0; k < kDimensions; ++k, place /= Curve::kSide) result[k] += size * (place % Curve::kSide);
+    for (int k = 0; k < kDimensions; ++k, slot /= Curve::kSide) result[k] += size * (slot % Curve::kSide);
     return result;
   }
 
@@ -165,20 +171,20 @@ class TreeBuilder {
     auto& children = levels_[static_cast<std::size_t>(depth)];
     const double child_size = size / Curve::kSide;
     std::size_t count = 0;
-    for (unsigned place = 0; place < Curve::kChildCount; ++place) {
-      children[place].clear();
-      const Place at = child_low(low, child_size, place);
+    for (unsigned slot = 0; slot < Curve::kChildCount; ++slot) {
+      children[slot].clear();
+      const Place at = child_low(low, child_size, slot);
       for (const auto f : list)
-        if (overlaps(faces_[f], f, at, child_size)) children[place].push_back(f);
-      count += children[place].size();
+        if (overlaps(faces_[f], f, at, child_size)) children[slot].push_back(f);
+      count += children[slot].size();
     }
     if (list.size() > kMaxFaces && list.size() <= kMaxFacesIfSmall &&
         static_cast<double>(count) > too_many_ * static_cast<double>(list.size()) &&
         area_bound(list, size) <= large_area_)
       return add_leaf(low, size, curve, depth, list);
     for (unsigned i = 0; i < Curve::kChildCount; ++i) {
-      const unsigned place = curve.place(i);
-      divide(child_low(low, child_size, place), child_size, curve.child(i), depth + 1, children[place]);
+      const unsigned slot = curve.slot(i);
+      divide(child_low(low, child_size, slot), child_size, curve.child(i), depth + 1, children[slot]);
     }
   }
 
@@ -187,7 +193,8 @@ class TreeBuilder {
   std::vector<Face> faces_;
   double small_area_ = 0, large_area_ = 0;
   double too_many_;
-  std::array<std::vector<std::vector<std::uint32_t>>, kDeepest + 1> levels_;  ///< lists of the children on the way down
+  std::array<std::vector<std::vector<std::uint32_t>>, kMaxDepth + 1>
+      levels_;  ///< lists of the children on the way down
 };
 
 }  // namespace

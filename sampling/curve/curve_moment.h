@@ -6,8 +6,8 @@
 #include "sampling/curve/hilbert.h"
 #include "sampling/curve/peano.h"
 
-/// Where a curve in the plane is after a share of its way, and the integral of its place so far, by a table that takes
-/// a few levels at once.
+/// Where a curve in the plane is after a share of its length, and the integral of its position up to there, by a table
+/// that takes a few levels at once.
 namespace hilbrush {
 
 /// All children of a few levels below a square, in order of the curve, by permutation.
@@ -19,7 +19,7 @@ struct CurveTable {
 
   struct Entry {
     double x = 0, y = 0;                ///< low corner in the unit square
-    double moment_x = 0, moment_y = 0;  ///< sum over the children before of their middles
+    double moment_x = 0, moment_y = 0;  ///< sum of the middles of the children before
     std::uint8_t permutation = 0;
   };
   std::array<std::array<Entry, kCount>, Curve::kPermutationCount> entries;
@@ -33,9 +33,10 @@ struct CurveTable {
         unsigned column = 0, row = 0, divisor = kCount;
         for (unsigned level = 0; level < kLevels; ++level) {
           divisor /= Curve::kChildCount;
-          const unsigned child = i / divisor % Curve::kChildCount, place = curve.place(child);
-          column = column * Curve::kSide + place % Curve::kSide;
-          row = row * Curve::kSide + place / Curve::kSide;
+          const unsigned child = i / divisor % Curve::kChildCount;
+          const unsigned slot = curve.slot(child);
+          column = column * Curve::kSide + slot % Curve::kSide;
+          row = row * Curve::kSide + slot / Curve::kSide;
           curve = curve.child(child);
         }
         entry = {static_cast<double>(column) / kAlong, static_cast<double>(row) / kAlong, moment_x, moment_y,
@@ -50,11 +51,11 @@ struct CurveTable {
 template <class Curve>
 inline constexpr CurveTable<Curve> kCurveTable{};
 
-/// Steps of the table that reach any depth that doubles can tell apart.
+/// As many steps of the table as doubles can tell apart.
 inline constexpr int kMaxCurveSteps = 8;
 
-/// Integral of the curve's place over its first `share`, in the unit square. Within each of the smallest squares (side
-/// 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the place is taken as its middle.
+/// Integral of the curve's position over its first `share`, in the unit square. Within each of the smallest squares
+/// (side 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the position is taken as the square's middle.
 template <class Curve>
 inline Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMaxCurveSteps) {
   using Table = CurveTable<Curve>;
@@ -78,7 +79,7 @@ inline Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMaxC
   return {moment_x + weight * (low_x + size / 2), moment_y + weight * (low_y + size / 2)};
 }
 
-/// Where the curve is after `share` of its way, in the unit square.
+/// Where the curve is after `share` of its length, in the unit square.
 template <class Curve>
 Eigen::Vector2d curve_place(Curve curve, double share) {
   using Table = CurveTable<Curve>;

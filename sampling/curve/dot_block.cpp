@@ -199,7 +199,7 @@ class CenterWriter : public DotWriter {
     for (std::size_t i = 1; i < ends.size(); ++i, ++index) {
       const Vector2d middle = (moments_[i] - moments_[i - 1]) / (ends[i] - ends[i - 1]);
       const Lifted lifted = lift(walk, node.low + node.size * middle, likely_frame_);
-      const SurfacePoint point = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
+      const SurfacePoint point = point_in_triangle(walk.frame(lifted.frame).triangle, lifted.b);
       const double asked = triangles_[point.triangle].asked(point.barycentric);
       if (is_surely_painted(asked)) {
         put_at(point, walk.chart(), asked);
@@ -243,7 +243,7 @@ class CenterWriter : public DotWriter {
     part.mass += mass;
     if (mass <= part.heaviest_mass) return;
     part.heaviest_mass = mass;
-    part.heaviest = surface_point(frame.triangle, lifted.b);
+    part.heaviest = point_in_triangle(frame.triangle, lifted.b);
     part.polygon_size = 0;
     part.heaviest_quad = StratumPart::kNoQuad;
   }
@@ -254,10 +254,10 @@ class CenterWriter : public DotWriter {
     StratumPart& part = begin_part(walk.chart());
     const auto& heaviest = walk.heaviest(node);
     for (const auto index : node.pieces) {
-      const auto& held = walk.held(index);
-      const FaceFrame& frame = walk.frame(held.frame);
-      const double scale = share * node.scale, mass = scale * held.integral.mass;
-      const Vector2d moment_b = scale * held.integral.first;
+      const auto& measured = walk.piece(index);
+      const FaceFrame& frame = walk.frame(measured.frame);
+      const double scale = share * node.scale, mass = scale * measured.integral.mass;
+      const Vector2d moment_b = scale * measured.integral.first;
       part.moment_O += mass * frame.origin_O + moment_b.x() * frame.e1_O + moment_b.y() * frame.e2_O;
       add_in_triangle(part, frame.triangle, moment_b);
       is_new_ = false;
@@ -269,7 +269,7 @@ class CenterWriter : public DotWriter {
     if (mass <= part.heaviest_mass) return;
     part.heaviest_mass = mass;
     part.heaviest =
-        surface_point(walk.frame(heaviest.frame).triangle, heaviest.integral.first / heaviest.integral.mass);
+        point_in_triangle(walk.frame(heaviest.frame).triangle, heaviest.integral.first / heaviest.integral.mass);
     part.polygon_size = heaviest.piece.corner_count;
     for (std::size_t i = 0; i < part.polygon_size; ++i) part.polygon[i] = heaviest.piece.corners[i].b;
     part.heaviest_quad = StratumPart::kNoQuad;
@@ -322,14 +322,14 @@ class PlaceWriter : public DotWriter {
         const double at = share + std::fmod(i * std::numbers::phi, 1.) / dots;
         const Vector2d place = node.low + node.size * curve_place(node.curve, at - std::floor(at));
         const Lifted lifted = lift(walk, place, likely_frame_);
-        const SurfacePoint point = surface_point(walk.frame(lifted.frame).triangle, lifted.b);
+        const SurfacePoint point = point_in_triangle(walk.frame(lifted.frame).triangle, lifted.b);
         if (lifted.is_inside && triangles_[point.triangle].asked(point.barycentric) > 0) return point;
       }
     }
     if (node.pieces.empty()) return heaviest_point(plan_.mass, walk.quad());
     const auto& heaviest = walk.heaviest(node);
     const std::uint32_t triangle = walk.frame(heaviest.frame).triangle;
-    const SurfacePoint center = surface_point(triangle, heaviest.integral.first / heaviest.integral.mass);
+    const SurfacePoint center = point_in_triangle(triangle, heaviest.integral.first / heaviest.integral.mass);
     if (triangles_[triangle].asked(center.barycentric) > 0) return center;
     std::vector<Vector2d> polygon;
     for (const auto& corner : heaviest.piece.all()) polygon.push_back(corner.b);

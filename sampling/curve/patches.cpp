@@ -42,11 +42,11 @@ Patch patch_of(const CurveMass& mass, const QuadWalk<Curve>& walk, const typenam
   }
   Patch patch{walk.chart(), node.depth, kind, node.at, node.mass, {}};
   for (const auto index : node.pieces) {
-    const auto& held = walk.held(index);
-    PatchPiece piece{walk.frame(held.frame).triangle, {}, held.integral};
+    const auto& measured = walk.piece(index);
+    PatchPiece piece{walk.frame(measured.frame).triangle, {}, measured.integral};
     piece.integral.mass *= node.scale;
     piece.integral.first *= node.scale;
-    for (const auto& corner : held.piece.all()) piece.corners_b.push_back(corner.b);
+    for (const auto& corner : measured.piece.all()) piece.corners_b.push_back(corner.b);
     patch.pieces.push_back(std::move(piece));
   }
   return patch;

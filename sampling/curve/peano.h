@@ -14,8 +14,8 @@ struct PeanoQuad {
   static constexpr unsigned kPermutationCount = 4;
   std::uint8_t permutation = 0;  ///< A, B, C or D
 
-  /// Place of the i-th child along the curve: column + kSide * row.
-  constexpr unsigned place(unsigned i) const { return kPlaces[permutation][i]; }
+  /// Slot of the i-th child along the curve: column + kSide * row.
+  constexpr unsigned slot(unsigned i) const { return kSlots[permutation][i]; }
   constexpr PeanoQuad child(unsigned i) const { return {kPermutations[permutation][i]}; }
   /// How the curve runs in the square to the right of this one, if both are walked one after the other.
   constexpr PeanoQuad next_square() const { return {permutation == kA ? kD : kA}; }
@@ -26,10 +26,10 @@ struct PeanoQuad {
                                                                              {kB, kD, kB, kC, kA, kC, kB, kD, kB},
                                                                              {kC, kA, kC, kB, kD, kB, kC, kA, kC},
                                                                              {kD, kB, kD, kA, kC, kA, kD, kB, kD}}};
-  static constexpr std::array<std::array<std::uint8_t, 9>, 4> kPlaces{{{0, 3, 6, 7, 4, 1, 2, 5, 8},
-                                                                       {8, 5, 2, 1, 4, 7, 6, 3, 0},
-                                                                       {2, 5, 8, 7, 4, 1, 0, 3, 6},
-                                                                       {6, 3, 0, 1, 4, 7, 8, 5, 2}}};
+  static constexpr std::array<std::array<std::uint8_t, 9>, 4> kSlots{{{0, 3, 6, 7, 4, 1, 2, 5, 8},
+                                                                      {8, 5, 2, 1, 4, 7, 6, 3, 0},
+                                                                      {2, 5, 8, 7, 4, 1, 0, 3, 6},
+                                                                      {6, 3, 0, 1, 4, 7, 8, 5, 2}}};
 
  public:
   constexpr PeanoQuad(std::uint8_t p = kA) : permutation(p) {}

@@ -65,7 +65,7 @@ SurfacePoint heaviest_point(const CurveMass& mass, std::size_t quad_index) {
   const std::span<const PieceMass> pieces = mass.pieces_of(quad);
   const auto heaviest =
       std::ranges::max_element(pieces, [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; });
-  const SurfacePoint center = surface_point(heaviest->triangle, heaviest->center_b.cast<double>());
+  const SurfacePoint center = point_in_triangle(heaviest->triangle, heaviest->center_b.cast<double>());
   if (mass.tone().asked(center) > 0) return center;
   std::vector<Eigen::Vector2d> polygon;
   with_curve(chart.kind, [&]<class Curve>(Curve) {
@@ -86,7 +86,7 @@ PaintedPoint center_on_surface(const CurveMass& mass, DotTriangles& triangles, c
   SurfacePoint point;
   if (part.triangle != kNoTriangle) {
     // A stratum in the plane of one triangle needs no search.
-    point = surface_point(part.triangle, part.moment_b / part.mass);
+    point = point_in_triangle(part.triangle, part.moment_b / part.mass);
   } else {
     const Eigen::Vector3d target = part.moment_O / part.mass;
     const SurfacePoint start = part.heaviest_quad == StratumPart::kNoQuad

@@ -11,7 +11,7 @@
 namespace hilbrush {
 
 /// `b`: the shares of the second and the third corner.
-inline SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d& b) {
+inline SurfacePoint point_in_triangle(std::uint32_t triangle, const Eigen::Vector2d& b) {
   return {triangle, {1 - b.x() - b.y(), b.x(), b.y()}};
 }
 

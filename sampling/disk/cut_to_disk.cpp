@@ -3,27 +3,30 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
-#include <queue>
 #include <utility>
 
 #include "sampling/base/union_find.h"
 #include "sampling/disk/refine.h"
+#include "sampling/disk/shortest_paths.h"
 
 namespace hilbrush {
 namespace {
 
-/// Sides of an outer boundary are split until none is longer than this share of all of it.
+/// Sides of an outer boundary are split until none is longer than this share of the whole boundary.
 constexpr double kMaxBoundarySide = 1. / 16;
-/// Faces that a whole mesh may get, shared out by area, and a component at most, before needles are looked at ...
-constexpr double kRefinedMesh = 40'000, kRefinedComponent = 5000;
-/// ... and towards Delaunay; then no component grows beyond kMaxGrowth times its own, but all may to kMinGrowth
-/// times.
-constexpr double kDelaunayMesh = 200'000, kDelaunayComponent = 80'000, kMaxGrowth = 16, kMinGrowth = 1.1;
-/// A disk with a shorter boundary, over the root of its area, is a bag: it is slit from its mouth to the far end.
-constexpr double kShortestBoundary = 1.2;
-/// So many roots are tried for the loops that open handles.
+/// Faces after refine(): of the whole mesh, shared out by area, and of one component at most.
+constexpr double kRefinedMesh = 40'000;
+constexpr double kRefinedComponent = 5000;
+/// The same after split_towards_delaunay(). A component grows to at most kMaxGrowth times its faces; kMinGrowth times
+/// is allowed to every component, whatever the other limits say.
+constexpr double kDelaunayMesh = 200'000;
+constexpr double kDelaunayComponent = 80'000;
+constexpr double kMaxGrowth = 16;
+constexpr double kMinGrowth = 1.1;
+/// A disk whose boundary, over the root of its area, is shorter is a bag: it is slit from its mouth to the far end.
+constexpr double kMinBoundary = 1.2;
+/// This many roots are tried for the loops that open handles.
 constexpr int kRootCount = 4;
 
 /// Shortest paths along edges from one vertex to all others.
@@ -58,27 +61,13 @@ struct Arcs {
 
 Distances distances_from(const std::vector<std::uint32_t>& sources, const Disk& disk, const Arcs& arcs) {
   Distances d;
-  d.to_vertex.assign(disk.positions().size(), std::numeric_limits<double>::infinity());
   d.last_side.assign(disk.positions().size(), kNoSide);
-  using Entry = std::pair<double, std::uint32_t>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  for (const auto source : sources) {
-    d.to_vertex[source] = 0;
-    queue.push({0, source});
-  }
-  while (!queue.empty()) {
-    const auto [distance, v] = queue.top();
-    queue.pop();
-    if (distance > d.to_vertex[v]) continue;
+  d.to_vertex = shortest_distances(disk.positions().size(), sources, [&](std::uint32_t v, auto reach) {
     for (std::uint32_t i = arcs.begin[v]; i < arcs.begin[v + 1]; ++i) {
-      const auto& arc = arcs.arcs[i];
-      const double longer = distance + disk.length(arc.side);
-      if (longer >= d.to_vertex[arc.to]) continue;
-      d.to_vertex[arc.to] = longer;
-      d.last_side[arc.to] = arc.side;
-      queue.push({longer, arc.to});
+      const Arcs::Arc& arc = arcs.arcs[i];
+      if (reach(arc.to, disk.length(arc.side))) d.last_side[arc.to] = arc.side;
     }
-  }
+  });
   return d;
 }
 
@@ -109,10 +98,11 @@ std::vector<BoundaryLoop> sorted_loops(const Disk& disk) {
   return loops;
 }
 
-/// The edges that close the shortest ways from source to source which cut the surface to a disk: a forest of shortest
-/// paths, a tree of faces across other edges, those in the longest ways first; each edge in neither closes one. With
-/// one vertex as the source these are loops (Erickson and Whittlesey, "Greedy optimal homotopy and homology
-/// generators", 2005), with the boundaries as sources arcs between them.
+/// Cutting a surface along shortest paths from source to source leaves a disk. Each such path consists of two paths of
+/// the forest of shortest paths and one edge between them, which closes it; these edges are returned. They are the
+/// edges that are neither in the forest nor crossed by a spanning tree of the faces, which takes the edges of the
+/// longest paths first. With one vertex as the source the paths are loops (Erickson and Whittlesey, "Greedy optimal
+/// homotopy and homology generators", 2005), with the boundaries as sources arcs between them.
 std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& distances) {
   struct Candidate {
     double length;
@@ -139,7 +129,7 @@ std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& dista
   return closing;
 }
 
-/// The closing edges and the paths from both ends of each to a source; of a single vertex without the stem that all
+/// The closing edges and the paths from both ends of each to a source. With a single source, without the stem that all
 /// loops share.
 std::vector<TriangleSide> cut_graph(const Disk& disk, const Distances& distances,
                                     const std::vector<char>& is_boundary) {
@@ -188,7 +178,7 @@ std::vector<TriangleSide> shortest_loops(const Disk& disk) {
     const Distances distances = distances_from({root}, disk, arcs);
     std::vector<TriangleSide> cut = cut_graph(disk, distances, none);
     if (best.empty() || length_of(disk, cut) < length_of(disk, best)) best = std::move(cut);
-    // From the first root to far ends, then from the middle of what was best.
+    // From the first root to far ends, then from the middle of the best cut.
     root = i + 2 < kRootCount ? distances.farthest() : disk.from(best[best.size() / 2]);
   }
   return best;
@@ -205,7 +195,10 @@ std::vector<TriangleSide> shortest_arcs(const Disk& disk, const std::vector<char
 std::vector<Eigen::Vector3d> forks_of(const Disk& disk, const std::vector<TriangleSide>& cut,
                                       const std::vector<char>& is_boundary) {
   std::vector<int> degree(disk.positions().size(), 0);
-  for (const TriangleSide side : cut) ++degree[disk.from(side)], ++degree[disk.to(side)];
+  for (const TriangleSide side : cut) {
+    ++degree[disk.from(side)];
+    ++degree[disk.to(side)];
+  }
   std::vector<Eigen::Vector3d> forks;
   for (std::size_t v = 0; v < degree.size(); ++v)
     if (degree[v] > (is_boundary[v] ? 0 : 2)) forks.push_back(disk.positions()[v]);
@@ -245,7 +238,8 @@ void refine_for_map(Disk& disk, double area_share) {
   split_towards_delaunay(disk, static_cast<std::size_t>(most));
 }
 
-/// Where a boundary loop may begin, and the corners of the shape: vertices change their numbers when cuts are opened.
+/// Where the boundary loop shall begin, and the corners of the shape, as positions: vertices change their numbers when
+/// cuts are opened.
 struct Marks {
   std::vector<Eigen::Vector3d> forks;
   std::optional<TriangleSide> start;
@@ -265,10 +259,10 @@ bool open_cuts(CutDisk& cut, const std::vector<TriangleSide>& edges, const Marks
   return true;
 }
 
-/// All but the longest loop, if there are more holes than may be cut open.
-void fill_holes(Disk& disk, std::size_t most_holes) {
+/// Fills all loops but the longest, if there are more holes than may be cut open.
+void fill_shorter_loops(Disk& disk, std::size_t max_holes) {
   const std::vector<BoundaryLoop> loops = sorted_loops(disk);
-  if (loops.size() <= most_holes + 1) return;
+  if (loops.size() <= max_holes + 1) return;
   for (std::size_t i = 1; i < loops.size(); ++i) disk.fill(loops[i]);
 }
 
@@ -281,16 +275,13 @@ BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
   return loop;
 }
 
-std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
-                                   std::string& reason, const CutOptions& options) {
-  if (component.genus < 0) {
-    reason = "its triangles do not form a surface";
-    return std::nullopt;
-  }
+CutResult cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
+                      const CutOptions& options) {
+  if (component.genus < 0) return {std::nullopt, "its triangles do not form a surface"};
   CutDisk cut{Disk(mesh, neighbors, component.triangles), {}, false, 0, {}};
   Disk& disk = cut.disk;
   refine_for_map(disk, options.area_share);
-  fill_holes(disk, options.most_holes);
+  fill_shorter_loops(disk, options.max_holes);
   const std::vector<char> is_boundary = boundary_vertices(disk);
   std::vector<TriangleSide> edges;
   Marks marks;
@@ -303,16 +294,13 @@ std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& ne
     marks.start = edges.back();
   }
   if (!marks.start) marks.forks = forks_of(disk, edges, is_boundary);
-  if (!open_cuts(cut, edges, marks)) {
-    reason = "no cut was found that makes it a disk";
-    return std::nullopt;
-  }
-  if (length_of(disk, cut.outer) < kShortestBoundary * std::sqrt(component.area_m2)) {
+  if (!open_cuts(cut, edges, marks)) return {std::nullopt, "no cut was found that makes it a disk"};
+  if (length_of(disk, cut.outer) < kMinBoundary * std::sqrt(component.area_m2)) {
     std::vector<std::uint32_t> all(disk.positions().size());
     std::iota(all.begin(), all.end(), 0u);
     extend_cut(cut, all);
   }
-  return cut;
+  return {std::move(cut), {}};
 }
 
 bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {

@@ -4,7 +4,7 @@
 
 #include "sampling/disk/disk.h"
 
-/// Makes a topological disk of a component: cut open along short paths.
+/// Makes a topological disk of a component: cuts it open along short paths.
 namespace hilbrush {
 
 struct CutDisk {
@@ -21,20 +21,26 @@ struct CutDisk {
 BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex);
 
 struct CutOptions {
-  double area_share = 1;        ///< of the whole surface: what a component is worth refining for
-  std::size_t most_holes = 32;  ///< of more boundaries all but the longest are filled: slits between them make a maze
+  double area_share = 1;  ///< of the component in the whole surface: how much it may be refined
+  /// A component with more holes has all its boundaries but the longest filled: slits between them would make a maze.
+  std::size_t max_holes = 32;
+};
+
+struct CutResult {
+  std::optional<CutDisk> cut;
+  std::string reason;  ///< why there is none
 };
 
 /// Coarse and blunt-angled triangulations are refined first, within bounds.
 /// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter). Handles and
 /// several boundaries: along the shortest arcs from boundary to boundary (or from one vertex back to it) that leave a
-/// disk; a bag with a small mouth is slit. A hole that is filled instead makes the curve jump across it. Returns
-/// nothing, and a reason, for what is not a manifold. Cost O(n log n).
-std::optional<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
-                                   std::string& reason, const CutOptions& options = {});
+/// disk; a bag with a small mouth is slit. A hole that is filled instead makes the curve jump across it. What is not a
+/// manifold cannot be cut. Cost O(n log n).
+CutResult cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
+                      const CutOptions& options = {});
 
-/// Cuts from the boundary to that one of the given vertices that lies deepest inside: a long finger, which the map
-/// would shrink to nothing, is slit open. False if all of them are on the boundary.
+/// Cuts from the boundary to that one of the given vertices that is farthest from it: this slits a long finger open,
+/// which the map would shrink to nothing. False if all of them are on the boundary.
 bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices);
 
 }  // namespace hilbrush

@@ -1,20 +1,19 @@
 #include "sampling/disk/flatten.h"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
-#include <queue>
 #include <utility>
 
 #include "sampling/disk/cut_to_disk.h"
+#include "sampling/disk/shortest_paths.h"
 #include "sampling/disk/square_map.h"
 
 namespace hilbrush {
 namespace {
 
-/// A component is divided so many times, and no piece with fewer triangles is.
+/// A component is halved at most this many times in a row, and no piece with fewer triangles is halved.
 constexpr int kMaxDivisions = 8;
-constexpr std::size_t kFewestToDivide = 40;
+constexpr std::size_t kMinTrianglesToDivide = 40;
 
 std::array<Eigen::Vector3d, 4> corner_positions(const CutDisk& cut, const SquareMap& map) {
   const double width = map.square_count;
@@ -43,55 +42,42 @@ FlatPiece make_piece(const CutDisk& cut, const SquareMap& map) {
   return piece;
 }
 
-/// The two halves of a component: what is nearer to one of two far ends, by way of the triangles' centers.
+/// The two halves of a component: the triangles nearer to one of two far ends, along paths over triangles' centers.
 std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const Neighbors& neighbors,
                                                  const std::vector<std::uint32_t>& triangles) {
-  const std::size_t n = triangles.size();
+  const auto n = static_cast<std::uint32_t>(triangles.size());
   const auto local = [&](std::uint32_t t) {
     const auto at = std::lower_bound(triangles.begin(), triangles.end(), t);
-    return at != triangles.end() && *at == t ? static_cast<std::size_t>(at - triangles.begin()) : n;
+    return at != triangles.end() && *at == t ? static_cast<std::uint32_t>(at - triangles.begin()) : n;
   };
-  const auto center = [&](std::size_t i) {
+  const auto center = [&](std::uint32_t i) {
     return Eigen::Vector3d(
         (mesh.corner(triangles[i], 0) + mesh.corner(triangles[i], 1) + mesh.corner(triangles[i], 2)) / 3);
   };
-  struct Ways {
-    std::vector<double> distance;
-    std::vector<std::size_t> source;
+  struct Paths {
+    std::vector<double> lengths;
+    std::vector<std::uint32_t> sources;  ///< where the path to a triangle begins
   };
-  const auto ways_from = [&](const std::vector<std::size_t>& sources) {
-    Ways ways{std::vector<double>(n, std::numeric_limits<double>::infinity()), std::vector<std::size_t>(n, n)};
-    using Entry = std::pair<double, std::size_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-    for (const auto s : sources) {
-      ways.distance[s] = 0;
-      ways.source[s] = s;
-      queue.push({0, s});
-    }
-    while (!queue.empty()) {
-      const auto [distance, i] = queue.top();
-      queue.pop();
-      if (distance > ways.distance[i]) continue;
+  const auto paths_from = [&](const std::vector<std::uint32_t>& sources) {
+    Paths paths{{}, std::vector<std::uint32_t>(n, n)};
+    for (const std::uint32_t s : sources) paths.sources[s] = s;
+    paths.lengths = shortest_distances(n, sources, [&](std::uint32_t i, auto reach) {
       for (const TriangleSide other : neighbors[triangles[i]]) {
-        const std::size_t j = other == kNoSide ? n : local(other.triangle);
-        if (j == n) continue;
-        const double longer = distance + (center(j) - center(i)).norm();
-        if (longer >= ways.distance[j]) continue;
-        ways.distance[j] = longer;
-        ways.source[j] = ways.source[i];
-        queue.push({longer, j});
+        const std::uint32_t j = other == kNoSide ? n : local(other.triangle);
+        if (j != n && reach(j, (center(j) - center(i)).norm())) paths.sources[j] = paths.sources[i];
       }
-    }
-    return ways;
+    });
+    return paths;
   };
-  const auto farthest = [&](std::size_t from) {
-    const Ways ways = ways_from({from});
-    return static_cast<std::size_t>(std::ranges::max_element(ways.distance) - ways.distance.begin());
+  const auto farthest = [&](std::uint32_t from) {
+    const std::vector<double> lengths = paths_from({from}).lengths;
+    return static_cast<std::uint32_t>(std::ranges::max_element(lengths) - lengths.begin());
   };
-  const std::size_t one_end = farthest(0), other_end = farthest(one_end);
-  const Ways ways = ways_from({one_end, other_end});
+  const std::uint32_t one_end = farthest(0);
+  const std::uint32_t other_end = farthest(one_end);
+  const Paths paths = paths_from({one_end, other_end});
   std::array<std::vector<std::uint32_t>, 2> result;
-  for (std::size_t i = 0; i < n; ++i) result[ways.source[i] == one_end ? 0 : 1].push_back(triangles[i]);
+  for (std::uint32_t i = 0; i < n; ++i) result[paths.sources[i] == one_end ? 0 : 1].push_back(triangles[i]);
   return result;
 }
 
@@ -111,7 +97,7 @@ class Flattening {
  private:
   void add(const Component& component, int divisions) {
     if (add_whole(component)) return;
-    if (component.genus < 0 || divisions == 0 || component.triangles.size() < kFewestToDivide) {
+    if (component.genus < 0 || divisions == 0 || component.triangles.size() < kMinTrianglesToDivide) {
       FlatPiece piece;
       piece.triangles_in_space = component.triangles;
       piece.corners_O = box_corners(mesh_, component.triangles);
@@ -128,9 +114,12 @@ class Flattening {
     options.area_share = share_per_m2_ * component.area_m2;
     const bool has_holes = component.boundary_loops > 1;
     for (int attempt = 0; attempt < (has_holes ? 2 : 1); ++attempt) {
-      if (attempt == 1) options.most_holes = 0;
-      auto cut = cut_to_disk(mesh_, neighbors_, component, result_.reason, options);
-      if (!cut) return false;
+      if (attempt == 1) options.max_holes = 0;
+      auto [cut, reason] = cut_to_disk(mesh_, neighbors_, component, options);
+      if (!cut) {
+        result_.reason = std::move(reason);
+        return false;
+      }
       const auto map = map_to_square(*cut);
       if (map) {
         result_.pieces.push_back(make_piece(*cut, *map));

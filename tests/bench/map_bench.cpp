@@ -1,6 +1,6 @@
-// Times the way from a mesh to its maps on the square, stage by stage, and says how good they are.
+// Times the stages from a mesh to its maps on the square, and measures the maps.
 //   map_bench MODEL [TRIANGLES [DOTS [REPEATS]]]
-// TRIANGLES: the mesh is subdivided to so many first (0: as it is). DOTS: constant tone, so many dots, for the path
+// TRIANGLES: the mesh is first subdivided to this many (0: unchanged). DOTS: dots of constant tone for the path
 // constant and the longest jumps (0: none).
 #include <algorithm>
 #include <chrono>
@@ -58,6 +58,23 @@ TexturedMesh read(const char* file, std::size_t triangles) {
   return triangles > mesh.triangle_count() ? test::subdivided(std::move(mesh), triangles) : mesh;
 }
 
+/// The path within one component.
+struct Part {
+  std::size_t count = 0;  ///< of dots
+  double path = 0;        ///< in meters
+  double jump = 0;        ///< the longest, in meters
+  std::size_t long_jumps = 0;
+};
+
+void print_part(const Part& part, std::size_t index, const ComponentReport& component, double pitch_m) {
+  std::printf(
+      "  component %zu: %zu triangles, genus %d, %d loops, %s%s; %zu dots, path %.3f, longest jump %.1f, over 5: "
+      "%zu\n",
+      index, component.triangle_count, component.genus, component.boundary_loops,
+      component.is_mapped ? "mapped" : "in space: ", component.order_reason.c_str(), part.count,
+      part.path / std::sqrt(static_cast<double>(part.count) * component.area_m2), part.jump / pitch_m, part.long_jumps);
+}
+
 void print_dots(const TexturedMesh& mesh, const SurfaceCurve& curve, std::size_t count) {
   ToneOptions tone_options;
   tone_options.untextured = Untextured::kMaterial;
@@ -66,11 +83,6 @@ void print_dots(const TexturedMesh& mesh, const SurfaceCurve& curve, std::size_t
   options.dot_count = count;
   SampleReport report;
   const DotSequence dots = place_dots(curve, tone, options, &report);
-  struct Part {
-    std::size_t count = 0;
-    double path = 0, jump = 0;
-    std::size_t long_jumps = 0;
-  };
   std::vector<Part> parts(curve.components().size());
   double between = 0;
   for (std::size_t i = 0; i < dots.dots.size(); ++i) {
@@ -93,15 +105,8 @@ void print_dots(const TexturedMesh& mesh, const SurfaceCurve& curve, std::size_t
   std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return parts[a].count > parts[b].count; });
   for (std::size_t k = 0; k < std::min<std::size_t>(order.size(), 6); ++k) {
     const Part& part = parts[order[k]];
-    const ComponentReport& component = curve.components()[order[k]];
     if (part.count < 10) break;
-    std::printf(
-        "  component %zu: %zu triangles, genus %d, %d loops, %s%s; %zu dots, path %.3f, longest jump %.1f, over 5: "
-        "%zu\n",
-        order[k], component.triangle_count, component.genus, component.boundary_loops,
-        component.is_mapped ? "mapped" : "in space: ", component.order_reason.c_str(), part.count,
-        part.path / std::sqrt(static_cast<double>(part.count) * component.area_m2), part.jump / dots.pitch_m,
-        part.long_jumps);
+    print_part(part, order[k], curve.components()[order[k]], dots.pitch_m);
   }
 }
 
@@ -109,8 +114,7 @@ void run(const TexturedMesh& mesh, std::size_t dots, Stages& stages, bool is_las
   const Neighbors neighbors = stages.time("1 neighbors", [&] { return find_neighbors(mesh.triangles); });
   const auto components = stages.time("2 components", [&] { return find_components(mesh, neighbors); });
   for (const Component& component : components) {
-    std::string reason;
-    auto cut = stages.time("3 cut", [&] { return cut_to_disk(mesh, neighbors, component, reason); });
+    auto cut = stages.time("3 cut", [&] { return cut_to_disk(mesh, neighbors, component).cut; });
     if (cut) stages.time("4 map", [&] { return map_to_square(*cut); });
   }
   stages.finish_repeat();

@@ -25,7 +25,7 @@ void walk(Curve curve, int depth, const Place& place, std::vector<Place>& out) {
   for (unsigned i = 0; i < Curve::kChildCount; ++i) {
     Place child;
     for (unsigned k = 0; k < 3; ++k)
-      child[k] = static_cast<int>(Curve::kSide) * place[k] + step_of<Curve>(curve.place(i), k);
+      child[k] = static_cast<int>(Curve::kSide) * place[k] + step_of<Curve>(curve.slot(i), k);
     walk(curve.child(i), depth - 1, child, out);
   }
 }

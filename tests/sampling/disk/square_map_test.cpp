@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "sampling/base/cross.h"
 #include "sampling/disk/orientation.h"
 #include "sampling/model/mesh_repair.h"
 #include "tests/support/meshes.h"
@@ -36,8 +37,7 @@ TEST(SquareMap, HasNoFlippedFaceAndFillsTheSquare) {
     const TexturedMesh mesh = repair_mesh(awkward).mesh;
     const Neighbors neighbors = find_neighbors(mesh.triangles);
     for (const Component& component : find_components(mesh, neighbors)) {
-      std::string reason;
-      auto cut = cut_to_disk(mesh, neighbors, component, reason);
+      auto [cut, reason] = cut_to_disk(mesh, neighbors, component);
       ASSERT_TRUE(cut) << reason;
       const auto map = map_to_square(*cut);
       ASSERT_TRUE(map);
@@ -47,11 +47,11 @@ TEST(SquareMap, HasNoFlippedFaceAndFillsTheSquare) {
         const Triangle& face = cut->disk.faces()[f];
         const Eigen::Vector2d u = map->places[face[1]] - map->places[face[0]],
                               v = map->places[face[2]] - map->places[face[0]];
-        area += .5 * (u.x() * v.y() - u.y() * v.x());
+        area += .5 * cross(u, v);
         const FaceSource& source = cut->disk.sources()[f];
         if (source.triangle == kNoTriangle) continue;
         const Eigen::Vector2d p = source.corners[1] - source.corners[0], q = source.corners[2] - source.corners[0];
-        surface += (p.x() * q.y() - p.y() * q.x()) * mesh.area_vector(source.triangle).norm();
+        surface += cross(p, q) * mesh.area_vector(source.triangle).norm();
       }
       EXPECT_NEAR(area, map->square_count, 1e-9 * map->square_count);
       EXPECT_NEAR(surface / component.area_m2, 1, 1e-9);
@@ -74,8 +74,8 @@ TEST(SquareMap, KnowsHandlesAndBoundaries) {
 TEST(SquareMap, GivesAStripItsSquaresInARow) {
   const TexturedMesh mesh = test::rectangle(.05, .005, 40, 4);
   const Neighbors neighbors = find_neighbors(mesh.triangles);
-  std::string reason;
-  auto cut = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0], reason);
+  auto [cut, reason] = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0]);
+  ASSERT_TRUE(cut) << reason;
   const auto map = map_to_square(*cut);
   ASSERT_TRUE(map);
   EXPECT_EQ(map->square_count, 10);
@@ -88,8 +88,8 @@ TEST(SquareMap, IsAllButConformalOnASlitBlob) {
     TexturedMesh mesh = test::sphere(.02, 96, 64);
     for (auto& vertex : mesh.vertices) vertex.z() *= length;
     const Neighbors neighbors = find_neighbors(mesh.triangles);
-    std::string reason;
-    auto cut = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0], reason);
+    auto [cut, reason] = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0]);
+    ASSERT_TRUE(cut) << reason;
     const auto map = map_to_square(*cut);
     ASSERT_TRUE(map);
     EXPECT_LE(map->lengthening, 1.006) << length << ", squares " << map->square_count;
