@@ -19,9 +19,9 @@ Vector2d hilbert_vertex(std::uint64_t index, int depth) {
   double size = 1;
   for (int level = depth - 1; level >= 0; --level) {
     const auto child = static_cast<unsigned>(index >> (2 * level) & 3u);
-    const unsigned place = quad.place(child);
+    const unsigned slot = quad.slot(child);
     size /= 2;
-    corner += size * Vector2d(place & 1u, place >> 1u);
+    corner += size * Vector2d(slot & 1u, slot >> 1u);
     quad = quad.child(child);
   }
   return corner + Vector2d::Constant(size / 2);
@@ -36,9 +36,9 @@ Vector2d peano_vertex(std::uint64_t index, int depth) {
   double size = 1;
   for (; scale > 0; scale /= PeanoQuad::kChildCount) {
     const auto child = static_cast<unsigned>(index / scale % PeanoQuad::kChildCount);
-    const unsigned place = quad.place(child);
+    const unsigned slot = quad.slot(child);
     size /= PeanoQuad::kSide;
-    corner += size * Vector2d(place % PeanoQuad::kSide, place / PeanoQuad::kSide);
+    corner += size * Vector2d(slot % PeanoQuad::kSide, slot / PeanoQuad::kSide);
     quad = quad.child(child);
   }
   return corner + Vector2d::Constant(size / 2);
@@ -54,7 +54,7 @@ Vector2d z_vertex(std::uint64_t index, int depth) {
   return {(static_cast<double>(x) + .5) * size, (static_cast<double>(y) + .5) * size};
 }
 
-/// Row by row, there and back.
+/// Row by row, every second row backwards.
 Vector2d rows_vertex(std::uint64_t index, int depth) {
   const std::uint64_t side = std::uint64_t{1} << depth;
   const std::uint64_t y = index / side, x = y % 2 == 0 ? index % side : side - 1 - index % side;
@@ -72,7 +72,7 @@ Vector2d vertex(PlaneCurve curve, std::uint64_t index, int depth) {
     case PlaneCurve::kRows:
       return rows_vertex(index, depth);
   }
-  check_failed(__FILE__, __LINE__, "no such curve");
+  check_failed(__FILE__, __LINE__, "unknown curve");
 }
 
 std::uint64_t vertex_count(PlaneCurve curve, int depth) {
@@ -81,14 +81,18 @@ std::uint64_t vertex_count(PlaneCurve curve, int depth) {
   return count;
 }
 
-/// Pearson's.
+/// Pearson's correlation coefficient.
 double correlation_of(const std::vector<Vector2d>& pairs) {
   Vector2d mean = Vector2d::Zero();
   for (const Vector2d& pair : pairs) mean += pair / static_cast<double>(pairs.size());
-  double xx = 0, yy = 0, xy = 0;
+  double xx = 0;
+  double yy = 0;
+  double xy = 0;
   for (const Vector2d& pair : pairs) {
     const Vector2d d = pair - mean;
-    xx += d.x() * d.x(), yy += d.y() * d.y(), xy += d.x() * d.y();
+    xx += d.x() * d.x();
+    yy += d.y() * d.y();
+    xy += d.x() * d.y();
   }
   return xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
 }

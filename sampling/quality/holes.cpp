@@ -13,7 +13,7 @@ using Eigen::Vector2d, Eigen::Vector3d;
 
 const auto kAnyPoint = [](std::uint32_t) { return true; };
 
-/// An octahedron whose faces are quartered `times` times, every new corner put on the unit sphere.
+/// An octahedron whose faces are divided into four `times` times, with all new corners on the unit sphere.
 std::vector<SearchTriangle> sphere_triangles(int times) {
   std::vector<SearchTriangle> triangles;
   for (const double x : {-1., 1.})

@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <vector>
 
-/// The place that is farthest from all points, by branch and bound: a triangle whose middle is d from the nearest point
-/// and r from its own farthest corner holds no place farther than d + r from all points.
+/// Finds the place that is farthest from all points, by branch and bound: in a triangle whose middle is d from the
+/// nearest point and r from its own farthest corner, no place is farther than d + r from all points.
 namespace hilbrush {
 
-/// A flat triangle in space that is searched. `face` is handed on to the distance function.
+/// A flat triangle in space that is searched. `face` is passed to the distance function.
 struct SearchTriangle {
   std::array<Eigen::Vector3d, 3> corners;
   std::uint32_t face = 0;
@@ -23,13 +23,15 @@ struct SearchTriangle {
     for (const auto& corner : corners) farthest = std::max(farthest, (corner - from).squaredNorm());
     return std::sqrt(farthest);
   }
-  /// Parted at the middle of its longest side.
+  /// Divided at the middle of its longest side.
   std::array<SearchTriangle, 2> halves() const {
     std::size_t longest = 0;
     double length = -1;
     for (std::size_t k = 0; k < 3; ++k)
-      if (const double side = (corners[(k + 1) % 3] - corners[k]).squaredNorm(); side > length)
-        length = side, longest = k;
+      if (const double side = (corners[(k + 1) % 3] - corners[k]).squaredNorm(); side > length) {
+        length = side;
+        longest = k;
+      }
     const Eigen::Vector3d middle = (corners[longest] + corners[(longest + 1) % 3]) / 2;
     SearchTriangle a = *this, b = *this;
     a.corners[(longest + 1) % 3] = middle;
@@ -39,8 +41,8 @@ struct SearchTriangle {
 };
 
 struct SearchLimits {
-  double precision = 1e-3;  ///< of the result, relative
-  double smallest_m = 0;    ///< triangles that reach no farther from their middle are not parted
+  double precision = 1e-3;  ///< relative error of the result
+  double smallest_m = 0;    ///< triangles whose corners are no farther from their middle are not divided
 };
 
 /// Largest value of `distance(place, face)` over all triangles; `distance` must not rise faster than the place moves.
@@ -48,12 +50,12 @@ struct SearchLimits {
 /// threads.
 template <class Distance>
 double largest_distance(std::vector<SearchTriangle> open, const Distance& distance, const SearchLimits& limits = {}) {
-  constexpr std::size_t kAtOnce = 1 << 14;
+  constexpr std::size_t kBatch = 1 << 14;  // triangles
   double best = 0;
-  std::vector<double> at_middle(kAtOnce), bound(kAtOnce);
+  std::vector<double> at_middle(kBatch), bound(kBatch);
   std::vector<SearchTriangle> batch;
   while (!open.empty()) {
-    const std::size_t count = std::min(kAtOnce, open.size());
+    const std::size_t count = std::min(kBatch, open.size());
     batch.assign(open.end() - static_cast<std::ptrdiff_t>(count), open.end());
     open.resize(open.size() - count);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {

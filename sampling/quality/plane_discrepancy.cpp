@@ -108,7 +108,11 @@ double log_log_slope(std::span<const double> counts, std::span<const double> val
   for (std::size_t i = 0; i < counts.size(); ++i) {
     if (!(counts[i] > 0) || !(values[i] > 0)) continue;
     const double x = std::log(counts[i]), y = std::log(values[i]);
-    n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y;
+    n += 1;
+    sx += x;
+    sy += y;
+    sxx += x * x;
+    sxy += x * y;
   }
   const double variance = n * sxx - sx * sx;
   return n < 2 || !(variance > 1e-12 * n * sxx) ? 0 : (n * sxy - sx * sy) / variance;

@@ -6,26 +6,28 @@
 #include <fstream>
 #include <limits>
 #include <numbers>
-#include <sstream>
 
 #include "sampling/base/input_error.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kWidth = 640, kHeight = 440, kLeftMargin = 76, kRightMargin = 20, kTopMargin = 40, kBottomMargin = 52;
+// Of a plot, in units of the drawing: pixels at 100 %.
+constexpr double kWidth = 640;
+constexpr double kHeight = 440;
+constexpr double kLeftMargin = 76;
+constexpr double kRightMargin = 20;
+constexpr double kTopMargin = 40;
+constexpr double kBottomMargin = 52;
 constexpr std::array kColors{"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b", "#6a4c93", "#555555", "#e07a3f", "#008b8b"};
 
-std::string number(double value, int digits = 4) {
-  std::ostringstream out;
-  out.precision(digits);
-  out << value;
-  return out.str();
-}
+/// Digits of labels and of widths.
+constexpr int kDigits = 4;
 
-/// A place in the drawing, to a tenth of its unit.
+/// A coordinate in the drawing, to a tenth of its unit.
 std::string place(double value) {
   const double tenths = std::round(value * 10) / 10;
   return number(tenths == 0 ? 0 : tenths, 6);
@@ -57,11 +59,11 @@ std::string opening(double width, double height) {
          "\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
 }
 
-/// From values to places along one side of the drawing.
+/// Maps values to coordinates along one side of the drawing.
 struct Axis {
   bool is_log;
-  double low, high;   ///< values (their logarithms)
-  double begin, end;  ///< places
+  double low, high;   ///< values, or their logarithms
+  double begin, end;  ///< coordinates in the drawing
 
   double to_scale(double value) const { return is_log ? std::log10(value) : value; }
   double at(double value) const { return begin + (to_scale(value) - low) / (high - low) * (end - begin); }
@@ -93,10 +95,16 @@ Axis axis_of(const Plot& plot, int coordinate) {
       axis.low = std::min(axis.low, axis.to_scale(point[coordinate]));
       axis.high = std::max(axis.high, axis.to_scale(point[coordinate]));
     }
-  if (coordinate == 1 && plot.y_least) axis.low = axis.to_scale(*plot.y_least);
-  if (coordinate == 1 && plot.y_most) axis.high = axis.to_scale(*plot.y_most);
-  if (!(axis.low <= axis.high)) axis.low = 0, axis.high = 1;
-  if (axis.high - axis.low < 1e-9) axis.low -= .5, axis.high += .5;
+  if (coordinate == 1 && plot.y_min) axis.low = axis.to_scale(*plot.y_min);
+  if (coordinate == 1 && plot.y_max) axis.high = axis.to_scale(*plot.y_max);
+  if (!(axis.low <= axis.high)) {
+    axis.low = 0;
+    axis.high = 1;
+  }
+  if (axis.high - axis.low < 1e-9) {
+    axis.low -= .5;
+    axis.high += .5;
+  }
   axis.begin = coordinate == 0 ? kLeftMargin : kHeight - kBottomMargin;
   axis.end = coordinate == 0 ? kWidth - kRightMargin : kTopMargin;
   return axis;
@@ -106,11 +114,11 @@ std::string frame_of(const Plot& plot, const Axis& x, const Axis& y) {
   std::string svg;
   for (const double value : x.ticks()) {
     svg += "<path stroke=\"#ddd\" d=\"M" + place(x.at(value)) + " " + place(y.begin) + "V" + place(y.end) + "\"/>\n";
-    svg += text_at(x.at(value), y.begin + 16, number(value), "text-anchor=\"middle\"");
+    svg += text_at(x.at(value), y.begin + 16, number(value, kDigits), "text-anchor=\"middle\"");
   }
   for (const double value : y.ticks()) {
     svg += "<path stroke=\"#ddd\" d=\"M" + place(x.begin) + " " + place(y.at(value)) + "H" + place(x.end) + "\"/>\n";
-    svg += text_at(x.begin - 6, y.at(value) + 4, number(value), "text-anchor=\"end\"");
+    svg += text_at(x.begin - 6, y.at(value) + 4, number(value, kDigits), "text-anchor=\"end\"");
   }
   svg += "<path stroke=\"black\" fill=\"none\" d=\"M" + place(x.begin) + " " + place(y.end) + "V" + place(y.begin) +
          "H" + place(x.end) + "\"/>\n";
@@ -155,7 +163,10 @@ struct Bounds {
   Vector2d high = Vector2d::Constant(-std::numeric_limits<double>::infinity());
 
   void take(const std::vector<Vector2d>& points) {
-    for (const Vector2d& p : points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+    for (const Vector2d& p : points) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
   }
 };
 
@@ -177,13 +188,12 @@ std::string picture_at(const PointPicture& picture, double left, double top, dou
     svg += "\"/>\n";
   }
   svg += "<path fill=\"none\" stroke=\"black\" stroke-linecap=\"round\" stroke-width=\"" +
-         number(std::max(.2, 2 * scale * picture.radius)) + "\" d=\"";
+         number(std::max(.2, 2 * scale * picture.radius), kDigits) + "\" d=\"";
   for (const Vector2d& point : picture.points) svg += "M" + to_page(point) + "h0";
   return svg + "\"/>\n";
 }
 
-/// The legend stands at the top, on the side where less of the plot is: left where most points of the upper half lie to
-/// the right.
+/// The legend is at the top, on the emptier side: on the left if most points of the upper half are on the right.
 bool is_upper_half_full_on_the_right(const Plot& plot, const Axis& x, const Axis& y) {
   std::ptrdiff_t balance = 0;
   for (const PlotSeries& series : plot.series)
@@ -244,7 +254,7 @@ void write_svg(const std::string& svg, const std::filesystem::path& file) {
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out << svg;
   out.close();
-  if (!out) throw InputError(file.string(), "can't be written");
+  if (!out) throw InputError(file.string(), "cannot be written");
 }
 
 }  // namespace hilbrush

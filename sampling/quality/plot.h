@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-/// Plots that a person can read: SVG text, written without a library. For figures of quality; nothing here measures.
+/// Plots as SVG text, written without a library: the figures of quality reports and of the benchmarks.
 namespace hilbrush {
 
 /// One curve of a plot.
@@ -18,14 +18,18 @@ struct PlotSeries {
 };
 
 struct Plot {
-  std::string title, x_label, y_label;
-  bool is_log_x = false, is_log_y = false;  ///< values that are not positive are left out
-  std::optional<double> y_least, y_most;    ///< else from the points
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  bool is_log_x = false;  ///< values that are not positive are left out
+  bool is_log_y = false;
+  std::optional<double> y_min;  ///< end of the y axis; by default that of the points
+  std::optional<double> y_max;
   std::vector<PlotSeries> series;
 };
 std::string svg_of(const Plot& plot);
 
-/// Dots, and a path through places, in a picture with equal scales; y upwards.
+/// Dots and a path, drawn with the same scale in x and y; y upwards.
 struct PointPicture {
   std::string title;
   std::vector<Eigen::Vector2d> points;
@@ -38,7 +42,7 @@ std::string svg_of(std::span<const PointPicture> pictures, const std::string& ti
 /// Parallel projection from (1, turn_deg around +z, height_deg above the xy plane) onto a plane; y of the result is up.
 Eigen::Vector2d project(const Eigen::Vector3d& place, double turn_deg, double height_deg);
 
-/// @throws InputError naming the file if it can't be written.
+/// @throws InputError with the name of the file if it cannot be written.
 void write_svg(const std::string& svg, const std::filesystem::path& file);
 
 }  // namespace hilbrush

@@ -13,7 +13,7 @@
 /// Points in a balanced tree of tight boxes: counts within shapes and nearest points, for plane and space alike.
 namespace hilbrush {
 
-/// How a box lies to a shape.
+/// How much of a box is inside a shape.
 enum class Overlap { kOutside, kInside, kPartly };
 
 template <int kDimension>
@@ -40,14 +40,14 @@ class PointTree {
 
   std::size_t size() const { return entries_.size(); }
 
-  /// Points within `shape`: `shape.overlap(box)` and `shape.contains(point)` say what that means. Cost O(sqrt n) in the
+  /// The number of points inside `shape`, which has `overlap(box)` and `contains(point)`. Cost O(sqrt n) in the
   /// plane, O(n^2/3) in space, if the shape's border is short.
   template <class Shape>
   std::size_t count(const Shape& shape) const {
     return entries_.empty() ? 0 : count_below(shape, 0, 0, entries_.size());
   }
 
-  /// The nearest point that `accept(index)` lets through.
+  /// The nearest point among those for which `accept(index)` is true.
   template <class Accept>
   Nearest nearest(const Point& place, Accept&& accept) const {
     return cheapest(place, [&accept](std::uint32_t index, double distance2, double) {
@@ -55,8 +55,9 @@ class PointTree {
     });
   }
 
-  /// The point of the least cost2(index, squared distance, least so far), which is no less than the squared distance;
-  /// asked only of points nearer than the least so far. The root of the cost is returned as the distance.
+  /// The point with the least cost2(index, squared distance, least so far). A cost must not be less than the squared
+  /// distance, because it is asked for only where that is less than the least cost so far. The square root of the cost
+  /// is returned as the distance.
   template <class Cost>
   Nearest cheapest(const Point& place, Cost&& cost2) const {
     Nearest best;
@@ -127,7 +128,7 @@ class PointTree {
     return count_below(shape, 2 * node + 1, begin, middle) + count_below(shape, 2 * node + 2, middle, end);
   }
 
-  /// `best.distance` is squared meanwhile.
+  /// Until it returns to cheapest(), `best.distance` is squared.
   template <class Cost>
   void search(const Point& place, Cost& cost2, std::size_t node, std::size_t begin, std::size_t end,
               Nearest& best) const {
@@ -169,7 +170,7 @@ class PointTree {
   std::vector<Box> boxes_;  ///< a heap: the children of node n are 2n + 1 and 2n + 2
 };
 
-/// Within a distance of a center.
+/// The points within a distance of a center.
 template <int kDimension>
 struct Ball {
   using Point = Eigen::Matrix<double, kDimension, 1>;
@@ -184,7 +185,7 @@ struct Ball {
   bool contains(const Point& p) const { return (p - center).squaredNorm() < radius * radius; }
 };
 
-/// What lies on the inner side of some lines or planes: normal . p > offset for all of them.
+/// The points on the inner side of some lines or planes: normal . p > offset for all of them.
 template <int kDimension, int kCount>
 struct HalfSpaces {
   using Point = Eigen::Matrix<double, kDimension, 1>;
@@ -197,7 +198,7 @@ struct HalfSpaces {
       const double middle = normals[k].dot(box.center()) - offsets[k];
       const double reach = .5 * normals[k].cwiseAbs().dot(box.sizes());
       if (middle + reach <= 0) return Overlap::kOutside;
-      // A hair is left to rounding: such boxes are looked into.
+      // Boxes that touch a plane within rounding count as partly inside, so their points are tested one by one.
       if (middle - reach <= 1e-12 * normals[k].norm()) result = Overlap::kPartly;
     }
     return result;

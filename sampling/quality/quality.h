@@ -11,10 +11,10 @@
 #include "sampling/model/textured_mesh.h"
 #include "sampling/tone/tone_field.h"
 
-/// How good a placement is, in figures: discrepancy, spectrum, spacing, holes, path. After chapter 5 and section 6.2.1
-/// of the thesis, with rms values beside its maxima, balls beside its sets of whole triangles, and holes and spacing,
-/// which it does not measure. Point sets in the unit square, on the unit sphere, and dots on a mesh.
-/// All of it is parallel, and the same to the last bit for any number of threads.
+/// Figures for the quality of a placement: discrepancy, spectrum, spacing, holes, path. After chapter 5 and
+/// section 6.2.1 of the thesis, with rms values beside its maxima, balls beside its sets of whole triangles, and holes
+/// and spacing, which it does not measure. Point sets in the unit square, on the unit sphere, and dots on a mesh. All
+/// of it runs in parallel and gives the same bits for any number of threads.
 namespace hilbrush {
 
 /// Test shapes are drawn at random; the same seed draws the same shapes.
@@ -25,7 +25,7 @@ struct TestShapes {
 
 /// |share of the points - share of the area| (on toned surfaces: of the asked dots) within test shapes.
 struct Discrepancy {
-  double rms = 0;      ///< over the shapes: steady, what targets are set on
+  double rms = 0;      ///< over the shapes: steady, so targets are set for this one
   double largest = 0;  ///< equation 5.1: the thesis's measure, noisy by 10 to 20 %
 };
 
@@ -50,7 +50,7 @@ double log_log_slope(std::span<const double> counts, std::span<const double> val
 struct Spacing {
   double smallest = 0, mean = 0;
   double spread = 0;              ///< standard deviation over mean
-  std::vector<double> distances;  ///< one a point, rising
+  std::vector<double> distances;  ///< one for each point, in rising order
 };
 Spacing plane_spacing(std::span<const Eigen::Vector2d> points);
 /// On the unit sphere, along chords.
@@ -69,7 +69,7 @@ double path_constant(std::span<const Eigen::Vector3d> points, double area);
 /// sqrt(N / A).
 struct Spectrum {
   struct Ring {
-    double frequency = 0;  ///< its middle
+    double frequency = 0;  ///< of its middle
     double power = 0;      ///< mean over the ring
     double anisotropy =
         0;  ///< variance over the ring, over the squared mean (Ulichney): 1 for white noise; 0 on surfaces
@@ -92,9 +92,9 @@ Spectrum plane_spectrum(std::span<const Eigen::Vector2d> points);
 /// Mean of spectra with the same rings (section 5.3 averages ten random sets).
 Spectrum average(std::span<const Spectrum> spectra);
 
-/// A mesh, and how many dots each piece of it should get: by its area, or by asked tone times area. Made once and asked
-/// about many sets of dots; asking is thread-safe. Lengths are over the local pitch sqrt(A / N) (on toned surfaces: of
-/// the tone asked there).
+/// Measures dots on a mesh against the number that each piece of it should get: by its area, or by asked tone times
+/// area. Made once for many sets of dots; all members are thread-safe. Lengths are over the local pitch sqrt(A / N) (on
+/// toned surfaces: of the tone asked there).
 class SurfaceQuality {
  public:
   /// Keeps references to both. @throws InputError if nothing is to be covered.
@@ -105,34 +105,33 @@ class SurfaceQuality {
   /// Area, or asked tone times area.
   double mass_m2() const;
 
-  /// The nearest point of the surface: for dots that were read from a file and have lost their triangle.
+  /// The nearest point of the surface: for dots from a file, which does not keep their triangles.
   SurfacePoint nearest(const Eigen::Vector3d& position_O) const;
 
-  /// Sections 6.2.1: contiguous sets of whole triangles, grown in rings around a random vertex until they hold a random
-  /// share of the area. Sees nothing finer than a triangle: flatters whatever is dealt out triangle by triangle.
-  /// Several sets at once, because growing is what costs.
+  /// Section 6.2.1: contiguous sets of whole triangles, grown in rings around a random vertex until they hold a random
+  /// share of the area. It cannot measure anything finer than a triangle, so it favors methods that distribute dots
+  /// triangle by triangle. Several sets of dots at once, because growing takes most of the time.
   std::vector<Discrepancy> triangle_sets(std::span<const std::span<const Dot>> sets,
                                          const TestShapes& shapes = {}) const;
-  /// What of the surface lies within a ball around a random surface point, radius 0 to half the bounding box's
+  /// The share of the surface within a ball around a random surface point, radius 0 to half the bounding box's
   /// diagonal. The expected share is exact: closed-form area of disc and triangle; under a texture the disc is a 64-gon
   /// of equal area, whose tone is integrated exactly.
   std::vector<Discrepancy> balls(std::span<const std::span<const Dot>> sets, const TestShapes& shapes = {}) const;
   /// Expected share of dots within a ball.
   double share_in_ball(const Eigen::Vector3d& center_O, double radius_m) const;
 
-  /// Neighbors and holes lie on the surface: a dot is as far as the radius at which a ball around the place holds a
-  /// way along the surface to it. That is the straight distance, over folds and bumps too, but to the far side of a
-  /// thin wall it is that around the rim. An empty disc is what of such a ball hangs together with its center.
+  /// Distances to neighbors, as DotsOnSurface measures them: straight ones across folds and bumps, but around the edge
+  /// to the far side of a thin wall.
   Spacing spacing(std::span<const Dot> dots) const;
-  /// Radius of the largest empty disc. Exact to 1e-3 of itself by branch and bound where the tone is constant; under a
-  /// texture to 1/8 of a pitch.
+  /// Radius of the largest empty disc: the part of a ball that is connected with its center on the surface. Within 1e-3
+  /// of itself by branch and bound where the tone is constant; under a texture within 1/8 of a pitch.
   double largest_hole(std::span<const Dot> dots) const;
   /// Over sqrt(N M), with M = mass_m2().
   double path_constant(std::span<const Dot> dots) const;
 
   /// Mean over patches around random surface points, about 20 pitches across, each flattened onto the tangent plane at
-  /// its center along chords and faded out towards its rim by (1 - r^2/R^2)^2. The even density of the same patch is
-  /// transformed along with the dots and taken off, so that neither its curvature nor its rim nor its tone counts as
+  /// its center along chords and faded out towards its border by (1 - r^2/R^2)^2. The even density of the same patch is
+  /// transformed like the dots and subtracted, so that neither its curvature nor its border nor its tone counts as
   /// power. Frequencies are resolved to about 1/16 of the principal one. Patches that bend by more than 60 degrees are
   /// left out. @throws InputError if none is left or there are fewer than 100 dots.
   Spectrum spectrum(std::span<const Dot> dots, std::uint64_t seed = 1) const;

@@ -12,7 +12,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kPointsAtOnce = 60000;
+/// Points of one square of plane_spectrum (quality.h).
+constexpr double kMaxPointsPerSquare = 60000;
+/// Rings up to twice the principal frequency, and sectors of half a turn: 5 degrees each.
 constexpr std::size_t kMaxRings = 80;
 constexpr std::size_t kMaxDirections = 36;
 
@@ -77,7 +79,7 @@ void complete_spectrum(Spectrum& spectrum) {
 Spectrum plane_spectrum(std::span<const Vector2d> points) {
   CHECK(!points.empty());
   const auto n = static_cast<double>(points.size());
-  const auto per_side = static_cast<std::size_t>(std::ceil(std::sqrt(n / kPointsAtOnce)));
+  const auto per_side = static_cast<std::size_t>(std::ceil(std::sqrt(n / kMaxPointsPerSquare)));
   if (per_side == 1) return spectrum_of_square(points, n);
   std::vector<std::vector<Vector2d>> squares(per_side * per_side);
   const auto side = static_cast<double>(per_side);
@@ -106,7 +108,10 @@ Spectrum average(std::span<const Spectrum> spectra) {
     mean.below_quarter += spectrum.below_quarter;
   }
   const double share = 1 / static_cast<double>(spectra.size());
-  for (Spectrum::Ring& ring : mean.rings) ring.power *= share, ring.anisotropy *= share;
+  for (Spectrum::Ring& ring : mean.rings) {
+    ring.power *= share;
+    ring.anisotropy *= share;
+  }
   for (double& power : mean.directions) power *= share;
   mean.below_half *= share;
   mean.below_quarter *= share;

@@ -3,7 +3,7 @@
 
 namespace hilbrush {
 
-/// Collects powers, each at a frequency vector over the principal frequency, and sums them up.
+/// Sums up powers by ring and direction. Frequencies are over the principal frequency.
 class SpectrumSums {
  public:
   static constexpr double kHighest = 2;  ///< times the principal frequency
@@ -15,15 +15,22 @@ class SpectrumSums {
 
  private:
   struct Sum {
-    double count = 0, power = 0, square = 0;
-    void add(double p) { count += 1, power += p, square += p * p; }
+    double count = 0;
+    double power = 0;
+    double square = 0;
+
+    void add(double p) {
+      count += 1;
+      power += p;
+      square += p * p;
+    }
     double mean() const { return count > 0 ? power / count : 0; }
   };
   std::vector<Sum> rings_, directions_;
   Sum half_, quarter_;
 };
 
-/// Peak and anisotropy of a spectrum follow from its rings and directions.
+/// Calculates the peak and the anisotropy of a spectrum from its rings and directions.
 void complete_spectrum(Spectrum& spectrum);
 
 }  // namespace hilbrush

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 using Sets = std::span<const std::span<const Dot>>;
 
-/// The triangles around each vertex, one list after another.
+/// The triangles around each vertex, all lists in one vector.
 struct Fans {
   std::vector<std::uint32_t> begin, triangles;
 
@@ -31,7 +31,7 @@ struct Fans {
   }
 };
 
-/// Dots on each triangle, of all sets side by side: how many set s has on triangle t is at [t * set_count + s].
+/// The number of dots of each set on each triangle: that of set s on triangle t is at [t * set_count + s].
 std::vector<std::uint32_t> count_on_triangles(std::size_t triangle_count, Sets sets) {
   std::vector<std::uint32_t> counts(triangle_count * sets.size(), 0);
   for (std::size_t s = 0; s < sets.size(); ++s)
@@ -42,7 +42,7 @@ std::vector<std::uint32_t> count_on_triangles(std::size_t triangle_count, Sets s
   return counts;
 }
 
-/// Grows sets of triangles and keeps what it needs for the next one.
+/// Grows sets of triangles; keeps its memory from one to the next.
 class Grower {
  public:
   Grower(const SurfaceQuality::Implementation& surface, const Fans& fans)
@@ -81,7 +81,7 @@ class Grower {
   std::vector<std::uint32_t> queue_, order_;
 };
 
-/// A vertex that triangles use.
+/// A random vertex that belongs to a triangle.
 std::uint32_t random_vertex(const TexturedMesh& mesh, const Fans& fans, const ShapeNumbers& number) {
   for (unsigned attempt = 1; attempt + 1 < ShapeNumbers::kPerShape; ++attempt) {
     const auto v = static_cast<std::uint32_t>(number(attempt) * static_cast<double>(mesh.vertices.size()));
@@ -98,11 +98,11 @@ std::vector<Discrepancy> SurfaceQuality::triangle_sets(Sets sets, const TestShap
   const std::vector<std::uint32_t> counts = count_on_triangles(surface.mesh.triangle_count(), sets);
   std::vector<std::vector<double>> errors(sets.size(), std::vector<double>(shapes.count));
 
-  constexpr std::size_t kAtOnce = 16;  // shapes that share a grower
-  tbb::parallel_for(std::size_t{0}, (shapes.count + kAtOnce - 1) / kAtOnce, [&](std::size_t group) {
+  constexpr std::size_t kShapesPerGrower = 16;
+  tbb::parallel_for(std::size_t{0}, (shapes.count + kShapesPerGrower - 1) / kShapesPerGrower, [&](std::size_t group) {
     Grower grower(surface, fans);
     std::vector<std::uint64_t> sums(sets.size());
-    for (std::size_t i = group * kAtOnce; i < std::min(shapes.count, (group + 1) * kAtOnce); ++i) {
+    for (std::size_t i = group * kShapesPerGrower; i < std::min(shapes.count, (group + 1) * kShapesPerGrower); ++i) {
       const ShapeNumbers number(shapes, 6, i);
       std::fill(sums.begin(), sums.end(), 0u);
       const double mass =

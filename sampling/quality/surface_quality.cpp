@@ -14,18 +14,17 @@
 #include "sampling/quality/dots_on_surface.h"
 #include "sampling/quality/holes.h"
 #include "sampling/quality/spacing.h"
+#include "sampling/tone/tone_polygon.h"
 
 namespace hilbrush {
 namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-/// Mass of each triangle, and whether it lies evenly on it.
-std::vector<double> measure_masses(const TexturedMesh& mesh, const ToneField* tone,
-                                   std::vector<std::uint8_t>& is_even) {
+TriangleMasses measure_masses(const TexturedMesh& mesh, const ToneField* tone) {
   const std::size_t n = mesh.triangle_count();
-  std::vector<double> masses(n);
-  is_even.assign(n, 1);
+  TriangleMasses result{std::vector<double>(n), std::vector<std::uint8_t>(n, 1)};
+  auto& [masses, is_even] = result;
   tbb::parallel_for(std::size_t{0}, n, [&](std::size_t t) {
     if (!tone) {
       masses[t] = mesh.area_vector(t).norm();
@@ -37,7 +36,7 @@ std::vector<double> measure_masses(const TexturedMesh& mesh, const ToneField* to
     const double square_if_even = integral.area_m2 > 0 ? integral.mass * integral.mass / integral.area_m2 : 0;
     is_even[t] = integral.square <= square_if_even * (1 + 1e-9) ? 1 : 0;
   });
-  return masses;
+  return result;
 }
 
 /// Signed area that a disc around the origin has in common with the triangle (origin, a, b).
@@ -68,7 +67,7 @@ struct Flat {
   Vector2d operator()(const Vector3d& v) const { return {v.dot(x), v.dot(y)}; }
 };
 
-/// What of a convex polygon lies to the left of the line from p to q.
+/// The part of a convex polygon to the left of the line from p to q.
 std::vector<Vector2d> clip(const std::vector<Vector2d>& polygon, const Vector2d& p, const Vector2d& q) {
   const Vector2d inward(-(q - p).y(), (q - p).x());
   std::vector<Vector2d> kept;
@@ -81,7 +80,7 @@ std::vector<Vector2d> clip(const std::vector<Vector2d>& polygon, const Vector2d&
   return kept;
 }
 
-/// A regular polygon with as much area as the disc.
+/// A regular polygon with the same area as the disc.
 std::vector<Vector2d> polygon_like_disc(double radius) {
   constexpr int kSides = 64;
   const double step = 2 * std::numbers::pi / kSides;
@@ -91,6 +90,20 @@ std::vector<Vector2d> polygon_like_disc(double radius) {
   return polygon;
 }
 
+/// The mass of a convex polygon in barycentric coordinates: of fans from its first corner that have no more corners
+/// than a tone can integrate at once.
+double mass_of_polygon(const ToneField& tone, std::uint32_t triangle, const std::vector<Vector2d>& polygon) {
+  constexpr std::size_t kStep = kMaxPolygonCorners - 2;
+  double mass = 0;
+  for (std::size_t first = 1; first + 1 < polygon.size(); first += kStep) {
+    const std::size_t last = std::min(first + kStep, polygon.size() - 1);
+    std::vector<Vector2d> fan{polygon.front()};
+    for (std::size_t i = first; i <= last; ++i) fan.push_back(polygon[i]);
+    mass += tone.integrate(triangle, fan).mass;
+  }
+  return mass;
+}
+
 }  // namespace
 
 double disc_triangle_area(double radius, const Vector2d& a, const Vector2d& b, const Vector2d& c) {
@@ -98,7 +111,15 @@ double disc_triangle_area(double radius, const Vector2d& a, const Vector2d& b, c
 }
 
 SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const ToneField* t)
-    : mesh(m), tone(t), masses(measure_masses(m, t, is_even)), neighbors(find_neighbors(m.triangles)), tree(m, masses) {
+    : Implementation(m, t, measure_masses(m, t)) {}
+
+SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const ToneField* t, TriangleMasses measured)
+    : mesh(m),
+      tone(t),
+      is_even(std::move(measured.is_even)),
+      masses(std::move(measured.masses)),
+      neighbors(find_neighbors(m.triangles)),
+      tree(m, masses) {
   mass_sums.resize(masses.size());
   std::partial_sum(masses.begin(), masses.end(), mass_sums.begin());
   mass = mass_sums.empty() ? 0 : mass_sums.back();
@@ -128,7 +149,7 @@ double SurfaceQuality::Implementation::mass_in_ball(std::uint32_t triangle, cons
   sides << corners[1] - corners[0], corners[2] - corners[0];
   const Eigen::Matrix2d to_barycentric = sides.inverse();
   for (Vector2d& p : polygon) p = to_barycentric * (p - corners[0]);
-  return tone->integrate(triangle, polygon).mass;
+  return mass_of_polygon(*tone, triangle, polygon);
 }
 
 SurfacePoint SurfaceQuality::Implementation::random_point(double which, double u, double v) const {

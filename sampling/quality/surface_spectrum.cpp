@@ -20,32 +20,41 @@ namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-constexpr double kRadius = 10;  ///< of a patch, in pitches
-constexpr std::size_t kMaxPatches = 256;
+/// Radius of a patch in pitches.
+constexpr double kRadius = 10;
+/// Patches that are tried; those that bend too much are left out.
+constexpr std::size_t kPatches = 256;
+/// Rings up to twice the principal frequency: 1/16 of it each.
 constexpr std::size_t kRings = 32;
-constexpr std::size_t kDirections = 8;  ///< over half a turn
-constexpr double kMinCosine = .5;       ///< of the bend within a patch
+/// Directions over half a turn.
+constexpr std::size_t kDirections = 8;
+/// A patch may bend by 60 degrees: the least cosine between the normals of its center and of its triangles.
+constexpr double kMinCosine = .5;
+/// A patch holds about 300 dots, so with fewer dots than this there is hardly a patch.
 constexpr std::size_t kMinDots = 100;
+/// Longest side of the pieces that stand for the even density, in pitches: their own rows show only above the highest
+/// frequency.
+constexpr double kMaxPiecePitches = .45;
 
 struct Weighted {
   Vector2d place;  ///< on the tangent plane, in pitches
   double weight;
 };
 
-/// What a patch holds: its dots, and the even density that they are held against.
+/// A patch: its dots, and the even density with which they are compared.
 struct FlatPatch {
   std::vector<Weighted> dots, even;
   double squares = 0;  ///< expected sum of squared weights of the dots
   bool is_flat_enough = true;
 };
 
-/// Fades out towards the rim.
+/// Fades out towards the border of the patch.
 double window(double distance_pitches) {
   const double s = 1 - std::pow(distance_pitches / kRadius, 2);
   return s <= 0 ? 0 : s * s;
 }
 
-/// The tangent plane around a surface point; lengths along chords, so that what bends keeps its extent.
+/// The tangent plane around a surface point; lengths are those of chords, so that a bent surface keeps its extent.
 class TangentPlane {
  public:
   TangentPlane(const Vector3d& center, const Vector3d& normal, double turn, double pitch)
@@ -100,7 +109,7 @@ class PatchMaker {
   }
 
  private:
-  /// Those that the ball touches and that hang together with the center's.
+  /// The triangles that the ball touches and that are connected with the center's within it.
   std::unordered_set<std::uint32_t> connected_triangles(std::uint32_t start, const TangentPlane& plane, double pitch,
                                                         FlatPatch& patch) const {
     std::unordered_set<std::uint32_t> found{start};
@@ -122,16 +131,18 @@ class PatchMaker {
     return found;
   }
 
-  /// The even density of a triangle as many small weights, so close that their own rows show only above the highest
-  /// frequency.
+  /// The even density of a triangle as many small weights.
   void add_even(std::uint32_t t, const std::array<Vector3d, 3>& corners, const TangentPlane& plane, double pitch,
                 FlatPatch& patch) const {
     std::size_t longest = 0;
     double length = 0;
     for (std::size_t k = 0; k < 3; ++k)
-      if (const double side = (corners[(k + 1) % 3] - corners[k]).norm(); side > length) length = side, longest = k;
+      if (const double side = (corners[(k + 1) % 3] - corners[k]).norm(); side > length) {
+        length = side;
+        longest = k;
+      }
     const Vector3d middle = (corners[0] + corners[1] + corners[2]) / 3;
-    if (length > .45 * pitch) {
+    if (length > kMaxPiecePitches * pitch) {
       if ((middle - plane.center()).norm() - length > kRadius * pitch) return;
       const Vector3d half = (corners[longest] + corners[(longest + 1) % 3]) / 2;
       std::array<Vector3d, 3> a = corners, b = corners;
@@ -156,8 +167,8 @@ class PatchMaker {
   double pitch_;
 };
 
-/// The patch's dots less its even density, transformed: sum of weight * exp(-2 pi i f direction . place) at the middles
-/// of all rings.
+/// The transform of the patch's dots minus its even density: sum of weight * exp(-2 pi i f direction . place) at the
+/// middles of all rings.
 std::array<std::complex<double>, kRings> transform(const Eigen::Matrix2Xd& places, const Eigen::ArrayXd& weights,
                                                    const Vector2d& direction) {
   constexpr double kStep = SpectrumSums::kHighest / kRings;
@@ -180,8 +191,14 @@ std::vector<double> powers(const FlatPatch& patch) {
   Eigen::Matrix2Xd places(2, count);
   Eigen::ArrayXd weights(count);
   Eigen::Index i = 0;
-  for (const Weighted& dot : patch.dots) places.col(i) = dot.place, weights[i++] = dot.weight;
-  for (const Weighted& even : patch.even) places.col(i) = even.place, weights[i++] = -even.weight;
+  for (const Weighted& dot : patch.dots) {
+    places.col(i) = dot.place;
+    weights[i++] = dot.weight;
+  }
+  for (const Weighted& even : patch.even) {
+    places.col(i) = even.place;
+    weights[i++] = -even.weight;
+  }
   std::vector<double> result;
   for (std::size_t d = 0; d < kDirections; ++d) {
     const double turn = std::numbers::pi * static_cast<double>(d) / kDirections;
@@ -191,15 +208,25 @@ std::vector<double> powers(const FlatPatch& patch) {
   return result;
 }
 
-/// Rings and the areas below half and quarter, whose rings weigh as much as they are wide around.
+/// Rings, and the means over the discs below half and a quarter of the principal frequency: a ring's weight is its
+/// circumference.
 Spectrum spectrum_of(const std::vector<double>& ring_powers) {
   Spectrum spectrum;
-  double half = 0, quarter = 0, half_weight = 0, quarter_weight = 0;
+  double half = 0;
+  double quarter = 0;
+  double half_weight = 0;
+  double quarter_weight = 0;
   for (std::size_t r = 0; r < kRings; ++r) {
     const double frequency = (static_cast<double>(r) + .5) * SpectrumSums::kHighest / kRings;
     spectrum.rings.push_back({frequency, ring_powers[r], 0});
-    if (frequency < .5) half += frequency * ring_powers[r], half_weight += frequency;
-    if (frequency < .25) quarter += frequency * ring_powers[r], quarter_weight += frequency;
+    if (frequency < .5) {
+      half += frequency * ring_powers[r];
+      half_weight += frequency;
+    }
+    if (frequency < .25) {
+      quarter += frequency * ring_powers[r];
+      quarter_weight += frequency;
+    }
   }
   spectrum.below_half = half / half_weight;
   spectrum.below_quarter = quarter / quarter_weight;
@@ -217,9 +244,9 @@ Spectrum SurfaceQuality::spectrum(std::span<const Dot> dots, std::uint64_t seed)
   for (std::size_t i = 0; i < dots.size(); ++i) places[i] = dots[i].position_O;
   const PointTree<3> tree(places);
   const PatchMaker maker(surface, dots, tree);
-  std::vector<std::vector<double>> of_patches(kMaxPatches);
-  tbb::parallel_for(std::size_t{0}, kMaxPatches, [&](std::size_t i) {
-    const ShapeNumbers number({kMaxPatches, seed}, 8, i);
+  std::vector<std::vector<double>> of_patches(kPatches);
+  tbb::parallel_for(std::size_t{0}, kPatches, [&](std::size_t i) {
+    const ShapeNumbers number({kPatches, seed}, 8, i);
     const FlatPatch patch =
         maker.make(surface.random_point(number(0), number(1), number(2)), 2 * std::numbers::pi * number(3));
     if (patch.is_flat_enough && patch.squares > 0) of_patches[i] = powers(patch);

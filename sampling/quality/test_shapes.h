@@ -9,13 +9,13 @@
 #include "sampling/curve/sequence.h"
 #include "sampling/quality/quality.h"
 
-/// What all test shapes share: random numbers that any thread can have, and how errors become figures.
+/// Shared by all test shapes: random numbers that do not depend on threads, and the figures of their errors.
 namespace hilbrush {
 
 /// The numbers of one shape: number(0), number(1), ... in [0, 1).
 class ShapeNumbers {
  public:
-  /// `kind` tells kinds of shapes apart, so that they do not share their numbers.
+  /// `kind` is a number for each kind of shape, so that they do not share their random numbers.
   ShapeNumbers(const TestShapes& shapes, std::uint64_t kind, std::size_t shape)
       : seed_(shapes.seed * 64 + kind), first_(static_cast<std::uint64_t>(shape) * kPerShape) {}
   double operator()(unsigned k) const { return uniform_number(seed_, first_ + k); }

@@ -29,7 +29,7 @@ TEST(PlaneDiscrepancy, OfOnePointIsItsClosedForm) {
   EXPECT_NEAR(circles.rms, std::sqrt(pi * pi / 80 + (1 - r) - pi / 6 * (1 - r * r * r)), .003);
   EXPECT_NEAR(circles.largest, 1 - pi / 8, .001);
 
-  // Triangles do not hold their own corner: what is left is their area.
+  // Triangles do not contain their own corner, so their error is their area.
   const Discrepancy triangles = plane_discrepancy(std::vector<Vector2d>{{0, 0}}, PlaneShape::kTriangle, kManyShapes);
   EXPECT_NEAR(triangles.rms, std::sqrt((2. / 9 - 1. / 8) / 4), .003);
   EXPECT_LE(triangles.largest, .5);
@@ -109,7 +109,7 @@ TEST(PointTree, CountsEveryPointOnce) {
   std::uniform_real_distribution<double> unit(0, 1);
   for (const std::size_t n : {1u, 7u, 8u, 9u, 100u, 10'000u}) {
     auto flat = random_points(n, 1 + static_cast<unsigned>(n));
-    for (std::size_t i = 0; i < n / 3; ++i) flat[i] = flat[n / 2];  // many alike
+    for (std::size_t i = 0; i < n / 3; ++i) flat[i] = flat[n / 2];  // many equal points
     const auto space = random_directions(n, 2 + static_cast<unsigned>(n));
     const PointTree<2> tree2(flat);
     const PointTree<3> tree3(space);

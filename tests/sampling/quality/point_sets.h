@@ -20,7 +20,7 @@ inline std::vector<Eigen::Vector2d> random_points(std::size_t count, unsigned se
   return points;
 }
 
-/// The middles of side * side squares, row by row, there and back.
+/// The middles of side * side squares, row by row, every second row backwards.
 inline std::vector<Eigen::Vector2d> grid_points(int side) {
   std::vector<Eigen::Vector2d> points;
   for (int j = 0; j < side; ++j)
@@ -65,7 +65,7 @@ inline Dot dot_at(const TexturedMesh& mesh, const SurfacePoint& point) {
   return dot;
 }
 
-/// Dots anywhere on a mesh, by area.
+/// Random dots on a mesh, by area.
 inline std::vector<Dot> random_dots(const TexturedMesh& mesh, std::size_t count, unsigned seed) {
   std::mt19937_64 random(seed);
   std::vector<double> areas;

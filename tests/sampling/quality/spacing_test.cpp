@@ -89,7 +89,12 @@ TEST(Coherence, OfRowsIsThatOfTheirDistance) {
   double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double straight = (a[i] - b[i]).norm(), along = std::abs(a[i].y() - b[i].y());
-    n += 1, x += straight, y += along, xx += straight * straight, yy += along * along, xy += straight * along;
+    n += 1;
+    x += straight;
+    y += along;
+    xx += straight * straight;
+    yy += along * along;
+    xy += straight * along;
   }
   const double expected = (xy / n - x * y / n / n) / std::sqrt((xx / n - x * x / n / n) * (yy / n - y * y / n / n));
   const Coherence rows = spatial_coherence(PlaneCurve::kRows, 12, {20'000, 2});

@@ -56,7 +56,7 @@ TEST(PlaneSpectrum, OfWhiteNoiseIsOneEverywhere) {
   EXPECT_LT(mean.anisotropy, .2);
 }
 
-/// One random point in each square of a grid: P(f) = 1 - |sinc(f_x) sinc(f_y)|^2, of the squares' own transform. Its
+/// One random point in each square of a grid: P(f) = 1 - |sinc(f_x) sinc(f_y)|^2, from the transform of a square. Its
 /// mean below half the principal frequency.
 double jitter_below_half() {
   const auto sinc2 = [](double f) {
@@ -65,7 +65,10 @@ double jitter_below_half() {
   double sum = 0, weight = 0;
   for (double x = -.5; x < .5; x += .002)
     for (double y = -.5; y < .5; y += .002)
-      if (x * x + y * y < .25) sum += 1 - sinc2(x) * sinc2(y), weight += 1;
+      if (x * x + y * y < .25) {
+        sum += 1 - sinc2(x) * sinc2(y);
+        weight += 1;
+      }
   return sum / weight;
 }
 
@@ -102,7 +105,8 @@ TEST(SurfaceSpectrum, OfAGridOnAPlateIsEmptyBelow) {
   EXPECT_GT(spectrum.peak, 5);
 }
 
-/// The even density is taken off with its own bends, rims and tones, so that a spiral's low power is seen to be low.
+/// The even density is subtracted with its own curvature, borders and tones, so that the low power of a spiral remains
+/// low.
 TEST(SurfaceSpectrum, OfAnEvenSpiralOnASphereIsLowBelow) {
   const TexturedMesh mesh = test::sphere(.025, 96, 48);
   const SurfaceQuality quality(mesh);

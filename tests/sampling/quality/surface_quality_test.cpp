@@ -44,7 +44,7 @@ TEST(DiscTriangleArea, OfTwoHalvesIsThatOfTheWhole) {
 }
 
 TEST(SurfaceQuality, ABallOnASphereCutsPiRSquared) {
-  // Archimedes: what a ball around a point of a sphere cuts out of it has the area of a flat disc of that radius.
+  // Archimedes: a ball around a point of a sphere cuts out of it the area of a flat disc with that radius.
   const double r = .025;
   const TexturedMesh mesh = test::sphere(r, 400, 200);
   const SurfaceQuality quality(mesh);
@@ -61,7 +61,7 @@ TEST(SurfaceQuality, ABallOnAPlateIsExact) {
   const SurfaceQuality quality(mesh);
   EXPECT_NEAR(quality.share_in_ball({.025, .02, 0}, .015), kPi * .015 * .015 / .0025, 1e-12);
   EXPECT_NEAR(quality.share_in_ball({.025, .02, .009}, .015), kPi * .012 * .012 / .0025, 1e-12);
-  EXPECT_NEAR(quality.share_in_ball({0, .02, 0}, .015), kPi * .015 * .015 / .005, 1e-12);  // half over the rim
+  EXPECT_NEAR(quality.share_in_ball({0, .02, 0}, .015), kPi * .015 * .015 / .005, 1e-12);  // half beyond the border
 }
 
 TEST(SurfaceQuality, AToneIsCountedByItsMass) {
@@ -130,8 +130,8 @@ TEST(SurfaceQuality, AGridOnAPlateHasItsHoleSpacingAndPath) {
 }
 
 TEST(SurfaceQuality, TheTwoSidesOfAThinPlateAreApart) {
-  // Two plates a tenth of a pitch apart, facing away from each other; dots on one are no neighbors of dots on the
-  // other.
+  // Two plates a tenth of a pitch apart, facing away from each other; dots on one are not neighbors of dots on
+  // the other.
   TexturedMesh back = test::rectangle(.05, .05, 2, 2);
   for (auto& triangle : back.triangles) std::swap(triangle[1], triangle[2]);
   const TexturedMesh mesh = test::both(test::rectangle(.05, .05, 2, 2), back, {0, 0, -.0002});
@@ -199,7 +199,7 @@ TEST(SurfaceQuality, AWhiteSurfaceIsRefused) {
   EXPECT_THROW(SurfaceQuality(white, &tone), InputError);
 }
 
-/// What the product promises: strata centers are better than the thesis's jitter.
+/// The centers of strata are a better placement than the thesis's jitter.
 TEST(SurfaceQuality, CentroidIsBetterThanJitteredAndThatThanRandom) {
   const TexturedMesh mesh = test::sphere(.025);
   const SurfaceCurve curve(mesh);
