@@ -79,7 +79,7 @@ CellDescription in_real_time(CellDescription description) {
 }
 
 /// Where both the build and the installation put it.
-std::string guard_beside_me() {
+std::string guard_beside_program() {
   std::error_code error;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
   return (error ? std::filesystem::path() : self.parent_path()) / "hilbrush-laserguard";
@@ -89,8 +89,8 @@ bool has_simulated(const CellDeviceOptions& options) {
   return options.robot.index() == 0 || options.table.index() == 0 || options.laser.index() == 0;
 }
 
-/// Real devices, with simulated ones in the place of those that the cell file calls so. Those know no clock but their
-/// own, so it is everybody's as soon as there is one.
+/// Real devices, and simulated ones where the cell file says so. Simulated devices have a clock of their own, which all
+/// devices follow as soon as one is simulated.
 class RealDevices final : public CellDevices {
  public:
   RealDevices(const CellDescription& description, const CellDeviceOptions& options,
@@ -145,7 +145,7 @@ class RealDevices final : public CellDevices {
   /// The laser's link belongs to its guard, which turns it off whatever happens to this process.
   void make_laser(const CellDescription& description, const GuardArguments& arguments, const GateOptions& gate) {
     auto process = std::make_shared<GuardProcess>();
-    auto launch = [process, arguments] { return process->start(guard_beside_me(), to_command_line(arguments)); };
+    auto launch = [process, arguments] { return process->start(guard_beside_program(), to_command_line(arguments)); };
     const GuardedHead::Options options{.heartbeat_s = arguments.laser.heartbeat_s,
                                        .arm_timeout_s = arguments.laser.arm_timeout_s};
     auto head = std::make_unique<GuardedHead>(std::move(launch), options, clock_);

@@ -20,7 +20,7 @@ class CellDevices {
   /// From now on simulated devices append what they emit to this file; an empty path: nowhere. Real devices have no
   /// such record. Executor's thread, between runs. @throws std::runtime_error naming the file.
   virtual void record_emissions(const std::filesystem::path& file) = 0;
-  /// What each device says of itself, for people, once connected. @throws DriverError
+  /// How each device identifies itself, for people, once connected. @throws DriverError
   virtual std::vector<std::string> identify_robot() { return {"simulated"}; }
   virtual std::vector<std::string> identify_table() { return {"simulated"}; }
   virtual std::vector<std::string> identify_laser() { return {"simulated"}; }
@@ -35,7 +35,7 @@ struct CellHeld : InputError {
 
 /// Nothing is connected yet. The clock runs at the description's time_scale; a cell with any real device has no virtual
 /// time, there 0 means real time. Real devices are held by a lock on the cell's file while this lives.
-/// @throws InputError if the file's devices can't be read; CellHeld if another process holds them.
+/// @throws InputError if the file's devices cannot be read; CellHeld if another process holds them.
 std::unique_ptr<CellDevices> make_cell_devices(const CellDescription& description,
                                                const std::filesystem::path& cell_file);
 /// The same with devices that differ from the file's: slower, for commissioning.

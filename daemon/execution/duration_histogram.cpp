@@ -11,8 +11,8 @@ constexpr double kShortestS = 1e-6;
 }  // namespace
 
 void DurationHistogram::add(double duration_s) {
-  const double place = std::log2(std::max(duration_s, kShortestS) / kShortestS) * kBinsPerOctave;
-  ++bins_[std::min(bins_.size() - 1, static_cast<std::size_t>(place))];
+  const double bin = std::log2(std::max(duration_s, kShortestS) / kShortestS) * kBinsPerOctave;
+  ++bins_[std::min(bins_.size() - 1, static_cast<std::size_t>(bin))];
   ++count_;
   longest_s_ = std::max(longest_s_, duration_s);
 }

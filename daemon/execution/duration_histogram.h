@@ -17,7 +17,8 @@ class DurationHistogram {
   double longest_s() const { return longest_s_; }
 
  private:
-  static constexpr std::size_t kBinsPerOctave = 20, kOctaves = 31;
+  static constexpr std::size_t kBinsPerOctave = 20;
+  static constexpr std::size_t kOctaves = 31;
   std::array<std::uint32_t, kBinsPerOctave * kOctaves> bins_{};
   std::uint64_t count_ = 0;
   double longest_s_ = 0;

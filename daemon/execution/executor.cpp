@@ -15,19 +15,20 @@ namespace {
 
 constexpr double kGraceS = 5;         ///< how much later than the time model a move may end before it counts as lost
 constexpr double kPulseGraceS = 0.1;  ///< the same for a pulse
-/// However fast the cell's clock runs: this host, its network and its scheduler are no faster.
+/// At least this much on the wall, however fast the cell's clock runs: this host, its network and its scheduler do not
+/// run faster with it.
 constexpr double kWallGraceS = 0.25;
 
-/// What is known of the axes must not be older than this when a pulse begins and when it is believed: on a busy machine
-/// whoever listens to a device may be kept waiting while it drifts. Several frames, or readings.
-constexpr double kSightS = 0.03;
-constexpr double kSightWallS = 0.005;
+/// A status must not be older than this, in seconds, when a pulse begins and when it is believed: on a busy machine the
+/// thread that listens to a device may have to wait while an axis drifts. Several frames, or readings.
+constexpr double kStatusAgeMaxS = 0.03;
+constexpr double kStatusAgeMaxWallS = 0.005;
 
-constexpr double kReadingWallS = 2;  ///< for a laser's account of a pulse that is over
+constexpr double kReadingWallS = 2;  ///< for a laser to report a pulse that is over
 
-double grace_s(const Clock& clock, double cell_s, double least_wall_s = kWallGraceS) {
+double grace_s(const Clock& clock, double cell_s, double wall_min_s = kWallGraceS) {
   const double wall_of_one = clock.wall_s(1);
-  return wall_of_one > 0 ? std::max(cell_s, least_wall_s / wall_of_one) : cell_s;
+  return wall_of_one > 0 ? std::max(cell_s, wall_min_s / wall_of_one) : cell_s;
 }
 
 /// Ends a run early without a fault; carries no text because it is thrown on the ordinary way out of a stop or a pause.
@@ -35,8 +36,8 @@ struct RunEnded {
   ExecutionOutcome outcome;
 };
 
-/// How far the measured positions may be from a target that a device says it has reached: catches an answer that is
-/// about an earlier move. Devices judge by far smaller windows of their own.
+/// How far the measured positions may be from a target that a device reports as reached: catches an answer to an
+/// earlier move. The windows of the devices themselves are far smaller.
 constexpr double kPositionWindow = 3.5e-4;  ///< rad, 0.02 degrees
 constexpr double kPrismaticWindow = 2e-5;   ///< m
 
@@ -77,7 +78,7 @@ class Run {
       ExecutionControl& control)
       : program_(program), cell_(cell), description_(description), journal_(journal), control_(control) {}
 
-  void travel_all(const std::vector<Joints>& way);
+  void travel_all(const std::vector<Joints>& path);
   void expose_all(const std::vector<Joints>& approach, const ExecutionProgress& progress);
   std::size_t exposed() const { return exposed_; }
   const DurationHistogram& own_time() const { return own_time_; }
@@ -85,10 +86,11 @@ class Run {
 
  private:
   enum class Rest { kPassing, kSettled };
-  /// What is sent for one or more way-points at once.
+  /// What is sent for one or more waypoints at once.
   struct Leg {
-    std::span<const Joints> way;
-    bool moves_robot = false, moves_table = false;
+    std::span<const Joints> path;
+    bool moves_robot = false;
+    bool moves_table = false;
     double travel_s = 0;
     double settle_s = 0;  ///< at its end, if it ends in an exposure
   };
@@ -99,9 +101,9 @@ class Run {
   void end_if_asked() const;
   void end_if_asked_or_paused() const;
   std::span<const Via> vias_of(std::size_t i);
-  void follow(std::span<const Joints> way, Rest rest);
-  Leg plan_leg(std::span<const Joints> way, Rest rest, double now_s) const;
-  std::size_t way_points_at_once(std::span<const Joints> way) const;
+  void follow(std::span<const Joints> path, Rest rest);
+  Leg plan_leg(std::span<const Joints> path, Rest rest, double now_s) const;
+  std::size_t waypoints_at_once(std::span<const Joints> path) const;
   void move(const Leg& leg, Rest rest);
   template <std::size_t N>
   void send(AxisGroup<N>& chain, const Leg& leg, double settle_s);
@@ -110,7 +112,7 @@ class Run {
   void expose(std::size_t i);
   void prepare_next(std::size_t i);
   template <std::size_t N>
-  void prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& told, std::size_t next);
+  void prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& sent, std::size_t next);
   void wait_for_fresh_status();
   void check_in_place(const char* when);
   void check_pulse_conditions(const Laser::Status& laser);
@@ -125,11 +127,11 @@ class Run {
 
   Laser::Limits laser_limits_;
   Joints at_{};                                   ///< where the last finished move ended
-  std::optional<Robot::Positions> robot_target_;  ///< what each chain was last told in this run
+  std::optional<Robot::Positions> robot_target_;  ///< last sent to each chain in this run
   std::optional<Table::Positions> table_target_;
   double rung_down_s_ = 0;         ///< when what was passed without settling will be at rest, on the cell's clock
   bool is_off_verified_ = false;   ///< since the last pulse
-  std::vector<Joints> way_;        ///< to the exposure under way
+  std::vector<Joints> path_;       ///< to the exposure under way
   std::size_t next_exposure_ = 0;  ///< that exposure
   std::size_t next_via_ = 0;
   std::size_t exposed_ = 0;
@@ -148,8 +150,8 @@ void Run::end_if_asked_or_paused() const {
   if (control_.pause.load()) throw RunEnded{ExecutionOutcome::kPaused};
 }
 
-/// One exchange with the device after each pulse, and at the beginning; what has been proved stays so until the next
-/// pulse is asked for, by nobody but this class. The last frame is looked at every time: that costs nothing.
+/// One exchange with the device after each pulse, and at the beginning; the laser then stays off
+/// until the next pulse, which only this class orders. The last frame is checked every time: that costs nothing.
 void Run::verify_laser_off() {
   if (!is_off_verified_ && !cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
   is_off_verified_ = true;
@@ -189,88 +191,89 @@ void Run::check_laser_ready() {
                       (laser.fault.empty() ? "" : ": " + laser.fault));
 }
 
-/// Both chains start together at each way-point, because that is how the way was checked. Where only one of them moves,
-/// a device that can buffer gets several way-points at once.
-std::size_t Run::way_points_at_once(std::span<const Joints> way) const {
-  const bool moves_robot = robot_target_ != robot_part(way[0]);
-  const bool moves_table = table_target_ != table_part(way[0]);
+/// Both chains start together at each waypoint, because that is how the path was checked. Where only one of them moves,
+/// a device that can buffer gets several waypoints at once.
+std::size_t Run::waypoints_at_once(std::span<const Joints> path) const {
+  const bool moves_robot = robot_target_ != robot_part(path[0]);
+  const bool moves_table = table_target_ != table_part(path[0]);
   if (moves_robot == moves_table) return 1;
   const std::size_t most =
-      std::min(way.size(), 1 + (moves_robot ? cell_.robot.look_ahead() : cell_.table.look_ahead()));
+      std::min(path.size(), 1 + (moves_robot ? cell_.robot.look_ahead() : cell_.table.look_ahead()));
   const auto other_rests = [&](std::size_t i) {
-    return moves_robot ? table_part(way[i]) == table_part(way[i - 1]) : robot_part(way[i]) == robot_part(way[i - 1]);
+    return moves_robot ? table_part(path[i]) == table_part(path[i - 1])
+                       : robot_part(path[i]) == robot_part(path[i - 1]);
   };
   std::size_t count = 1;
   while (count < most && other_rests(count)) ++count;
   return count;
 }
 
-/// A chain that rests where it shall be isn't commanded again, but its in_position is required. Way-points are passed
+/// A chain that already rests at its target is not commanded again, but must report in_position. Waypoints are passed
 /// without waiting for the axes to ring down, so what is left of that is added to the settling of the move that ends in
 /// an exposure.
-Run::Leg Run::plan_leg(std::span<const Joints> way, Rest rest, double now_s) const {
+Run::Leg Run::plan_leg(std::span<const Joints> path, Rest rest, double now_s) const {
   Leg leg;
-  leg.way = way;
+  leg.path = path;
   Joints from = at_;
   double rung_down_s = rung_down_s_;
-  for (const Joints& target : way) {
+  for (const Joints& target : path) {
     leg.travel_s += move_s(description_, from, target);
     leg.settle_s = std::max(settle_s(description_, from, target), rung_down_s - (now_s + leg.travel_s));
     rung_down_s = now_s + leg.travel_s + leg.settle_s;
     from = target;
   }
   const bool must_ring_down = rest == Rest::kSettled && rung_down_s_ > now_s;
-  const auto moves = [&](const auto& told, auto part) {
+  const auto moves = [&](const auto& sent, auto part) {
     return must_ring_down ||
-           std::any_of(way.begin(), way.end(), [&](const Joints& target) { return told != part(target); });
+           std::any_of(path.begin(), path.end(), [&](const Joints& target) { return sent != part(target); });
   };
   leg.moves_robot = moves(robot_target_, robot_part);
   leg.moves_table = moves(table_target_, table_part);
   return leg;
 }
 
-/// The chain that rests all the way is told once where it is, so that it settles.
+/// A chain that rests on the whole leg is sent its position once, so that it settles.
 template <std::size_t N>
 void Run::send(AxisGroup<N>& chain, const Leg& leg, double settle_s) {
   const auto part = [](const Joints& joints) { return chain_part<N>(joints); };
-  const bool rests = std::all_of(leg.way.begin(), leg.way.end(),
-                                 [&](const Joints& target) { return part(target) == part(leg.way.front()); });
-  const auto way = rests ? leg.way.last(1) : leg.way;
-  for (const Joints& target : way) chain.move_to(part(target), &target == &way.back() ? settle_s : 0);
+  const bool rests = std::all_of(leg.path.begin(), leg.path.end(),
+                                 [&](const Joints& target) { return part(target) == part(leg.path.front()); });
+  const auto path = rests ? leg.path.last(1) : leg.path;
+  for (const Joints& target : path) chain.move_to(part(target), &target == &path.back() ? settle_s : 0);
 }
 
 void Run::move(const Leg& leg, Rest rest) {
   end_if_asked();
   verify_laser_off();
   const double settle = rest == Rest::kSettled ? leg.settle_s : 0;
-  robot_target_ = robot_part(leg.way.back());
-  table_target_ = table_part(leg.way.back());
+  robot_target_ = robot_part(leg.path.back());
+  table_target_ = table_part(leg.path.back());
   count_own_time();
   const double ordered_s = cell_.clock.now_s();
   if (leg.moves_robot) send(cell_.robot, leg, settle);
   if (leg.moves_table) send(cell_.table, leg, settle);
   const double sent_s = cell_.clock.now_s();
-  const Joints from = std::exchange(at_, leg.way.back());
+  const Joints from = std::exchange(at_, leg.path.back());
   if (rest == Rest::kSettled) prepare_exposure();
   wait_in_position(sent_s + 2 * leg.travel_s + settle + grace_s(cell_.clock, kGraceS));
-  if (rest == Rest::kSettled && leg.way.size() == 1)
+  if (rest == Rest::kSettled && leg.path.size() == 1)
     motion_.add(description_, from, at_, idle_since_s_ - ordered_s - settle);
   rung_down_s_ = rest == Rest::kSettled ? 0 : cell_.clock.now_s() + leg.settle_s;
 }
 
 /// What the exposure at the end of the move needs, while the axes are under way.
 void Run::prepare_exposure() {
-  journal_.expect(next_exposure_);
+  journal_.open_window_for(next_exposure_);
   const Exposure& exposure = program_.exposures[next_exposure_];
   cell_.laser.prepare(exposure.power_w, exposure.pulse_s);
 }
 
-void Run::follow(std::span<const Joints> way, Rest rest) {
-  while (!way.empty()) {
-    const auto count = way_points_at_once(way);
-    const Rest at_end = count == way.size() ? rest : Rest::kPassing;
-    move(plan_leg(way.first(count), at_end, cell_.clock.now_s()), at_end);
-    way = way.subspan(count);
+void Run::follow(std::span<const Joints> path, Rest rest) {
+  while (!path.empty()) {
+    const auto count = waypoints_at_once(path);
+    const Rest at_end = count == path.size() ? rest : Rest::kPassing;
+    move(plan_leg(path.first(count), at_end, cell_.clock.now_s()), at_end);
+    path = path.subspan(count);
   }
 }
 
@@ -306,30 +309,31 @@ void Run::wait_in_position(double deadline_s) {
   }
 }
 
-void Run::travel_all(const std::vector<Joints>& way) {
+void Run::travel_all(const std::vector<Joints>& path) {
   check_axes_ready();
-  for (const Joints& target : way) check_pose(description_, target, 0);
-  follow(way, Rest::kPassing);
+  for (const Joints& target : path) check_pose(description_, target, 0);
+  follow(path, Rest::kPassing);
 }
 
-/// The way-points before exposure i that have not been passed yet.
+/// The waypoints before exposure i that have not been passed yet.
 std::span<const Via> Run::vias_of(std::size_t i) {
   const std::size_t first = next_via_;
   while (next_via_ < program_.vias.size() && program_.vias[next_via_].before_exposure <= i) ++next_via_;
   return std::span(program_.vias).subspan(first, next_via_ - first);
 }
 
-/// Until what is known of both chains is of the present.
+/// Until the status of both chains is recent enough.
 void Run::wait_for_fresh_status() {
   const double begun_s = cell_.clock.now_s();
-  const double since_s = begun_s - grace_s(cell_.clock, kSightS, kSightWallS);
-  const auto is_seen = [since_s](double read_s) { return read_s == 0 || read_s >= since_s; };
+  const double since_s = begun_s - grace_s(cell_.clock, kStatusAgeMaxS, kStatusAgeMaxWallS);
+  const auto is_fresh = [since_s](double read_s) { return read_s == 0 || read_s >= since_s; };
   for (;;) {
-    const bool sees_robot = is_seen(cell_.robot.status().read_s);
-    if (sees_robot && is_seen(cell_.table.status().read_s)) return;
+    const bool is_robot_fresh = is_fresh(cell_.robot.status().read_s);
+    if (is_robot_fresh && is_fresh(cell_.table.status().read_s)) return;
     const double now_s = cell_.clock.now_s();
     if (now_s > begun_s + grace_s(cell_.clock, kGraceS))
-      throw DriverError(std::string("the ") + (sees_robot ? "table" : "robot") + " has told nothing for too long");
+      throw DriverError(std::string("the ") + (is_robot_fresh ? "table" : "robot") +
+                        " has sent no status for too long");
     cell_.clock.sleep_until(now_s + description_.timing.tick_s);
   }
 }
@@ -346,14 +350,14 @@ void Run::check_in_place(const char* when) {
     throw DriverError(std::string("the table left its position ") + when + " a pulse");
 }
 
-/// The light goes out at once, whoever gates it, when what it needs is gone: a robot in alarm may have forgotten the
-/// end of the pulse that it was told.
+/// When a condition of the pulse is lost, the laser is turned off at once, whichever device gates it: a robot in alarm
+/// may have forgotten when the pulse was to end.
 void Run::check_pulse_conditions(const Laser::Status& laser) {
   if (!laser.interlock_closed) throw DriverError("the interlock was opened during a pulse");
   check_in_place("during");
 }
 
-/// The pulse's length is the device's business; here is only waited for its end, woken by whatever changes.
+/// The device times the pulse; this only waits for its end, woken by every change of a device.
 void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
   const double end_s = cell_.clock.now_s() + exposure.pulse_s;
   const double deadline_s = end_s + grace_s(cell_.clock, kPulseGraceS);
@@ -366,7 +370,7 @@ void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
       return;
     }
     check_pulse_conditions(laser);
-    // A gate that is known to be off needs no haste: some lasers take long to say how the pulse was.
+    // Once the gate is known to be off there is time: some lasers take long to report how the pulse was.
     const double reading_s = is_seen_over ? grace_s(cell_.clock, 0, kReadingWallS) : 0;
     if (now_s >= deadline_s + reading_s)
       throw DriverError("the laser still emits long after its pulse should have ended");
@@ -376,9 +380,9 @@ void Run::wait_pulse_end(double fired_s, const Exposure& exposure) {
 
 /// The first target ahead of a chain that is not where it was sent last, before or at exposure `next`.
 template <std::size_t N>
-void Run::prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& told, std::size_t next) {
+void Run::prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positions& sent, std::size_t next) {
   const auto prepare = [&](const Joints& target) {
-    if (chain_part<N>(target) == told) return false;
+    if (chain_part<N>(target) == sent) return false;
     if (is_within_limits(description_, target)) chain.prepare(chain_part<N>(target));
     return true;
   };
@@ -387,8 +391,8 @@ void Run::prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positi
   prepare(program_.exposures[next].joints);
 }
 
-/// While the pulse is on nothing moves, but what the next move needs can be on its way. Hints only: what is wrong with
-/// them the move itself will tell.
+/// While the pulse is on nothing moves, but the next targets can be sent already. Hints only: the move itself reports
+/// what is wrong with them.
 void Run::prepare_next(std::size_t i) {
   if (i + 1 >= program_.exposures.size() || journal_.state(i + 1) != ExposureState::kRemaining) return;
   try {
@@ -415,9 +419,9 @@ void Run::expose(std::size_t i) {
     prepare_next(i);
     wait_pulse_end(fired_s, exposure);
     verify_laser_off();
-    // Whoever cuts a pulse sets the flag before, so a flag that is still clear here means that the pulse was whole.
+    // A stop sets the flag before it cuts the pulse, so a flag that is still clear here means that the pulse was whole.
     end_if_asked();
-    // Whoever gates the light may have failed in the pulse and cut it, and an axis may have left its place unseen.
+    // The device that gates the laser may have failed and cut the pulse, and an axis may have left its position unseen.
     wait_for_fresh_status();
     const auto after = cell_.laser.status();
     check_pulse_conditions(after);
@@ -426,7 +430,7 @@ void Run::expose(std::size_t i) {
                         (after.fault.empty() ? "" : ": " + after.fault));
   } catch (...) {
     cell_.laser.off();
-    journal_.doubt(i);
+    journal_.mark_in_doubt(i);
     throw;
   }
   journal_.done(i);
@@ -447,24 +451,24 @@ void Run::expose_all(const std::vector<Joints>& approach, const ExecutionProgres
     end_if_asked_or_paused();
     const bool is_exposed = journal_.state(i) == ExposureState::kRemaining;
     if (is_exposed) check_pulse(laser_limits_, program_.exposures[i], i);
-    way_.clear();
-    if (i == first) way_ = approach;
-    for (const Via& via : vias_of(i)) way_.push_back(via.joints);
-    way_.push_back(program_.exposures[i].joints);
-    for (const Joints& target : way_) check_pose(description_, target, i);
+    path_.clear();
+    if (i == first) path_ = approach;
+    for (const Via& via : vias_of(i)) path_.push_back(via.joints);
+    path_.push_back(program_.exposures[i].joints);
+    for (const Joints& target : path_) check_pose(description_, target, i);
     next_exposure_ = i;
-    follow(way_, is_exposed ? Rest::kSettled : Rest::kPassing);
+    follow(path_, is_exposed ? Rest::kSettled : Rest::kPassing);
     if (!is_exposed) continue;
     expose(i);
     if (progress) progress(journal_.done_count());
   }
-  way_.clear();
-  for (const Via& via : vias_of(count)) way_.push_back(via.joints);
-  for (const Joints& target : way_) check_pose(description_, target, count);
-  follow(way_, Rest::kPassing);  // the way home
+  path_.clear();
+  for (const Via& via : vias_of(count)) path_.push_back(via.joints);
+  for (const Joints& target : path_) check_pose(description_, target, count);
+  follow(path_, Rest::kPassing);  // the path home
 }
 
-/// The laser first, then motion; both, whatever the other answers.
+/// The laser first, then motion; each, whatever the others answer.
 void make_safe(const Cell& cell) noexcept {
   cell.laser.off();
   cell.robot.stop();
@@ -489,13 +493,13 @@ ExecutionResult run_guarded(const Cell& cell, const ExecutionControl& control, W
     result.is_program_at_fault = true;
   } catch (const std::exception& error) {
     make_safe(cell);
-    // A device that refuses because it was just stopped is no fault.
+    // A device that refuses because it was just stopped is not at fault.
     result.outcome = control.stop.load() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed;
     result.reason = error.what();
   } catch (...) {
     make_safe(cell);
     result.outcome = ExecutionOutcome::kFailed;
-    result.reason = "something that is no exception escaped";
+    result.reason = "an unknown exception was thrown";
   }
   if (result.outcome == ExecutionOutcome::kStopped) result.reason = "the cell was stopped";
   result.elapsed_s = cell.clock.now_s() - begin_s;
@@ -519,12 +523,12 @@ ExecutionResult execute(const ExposureProgram& program, const std::vector<Joints
   return result;
 }
 
-ExecutionResult travel(const std::vector<Joints>& way, const Cell& cell, const CellDescription& description,
+ExecutionResult travel(const std::vector<Joints>& path, const Cell& cell, const CellDescription& description,
                        ExecutionControl& control) {
   const ExposureProgram no_program;
   Journal no_journal = Journal::in_memory(0);
   Run run(no_program, cell, description, no_journal, control);
-  return run_guarded(cell, control, [&] { run.travel_all(way); });
+  return run_guarded(cell, control, [&] { run.travel_all(path); });
 }
 
 void bring_up(const Cell& cell) {

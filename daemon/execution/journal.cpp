@@ -35,24 +35,26 @@ struct Boot {
   char id[64];
   std::uint64_t checksum;
 };
-constexpr std::size_t kBootPlace = kPage, kTables = 2 * kPage;
+constexpr std::size_t kBootOffset = kPage;
+constexpr std::size_t kTables = 2 * kPage;
 static_assert(sizeof(Header) <= kPage && sizeof(Boot) <= kPage);
 
-/// A record: the state in the low byte, 56 bits of checksum over state, place and table above it. All-zero storage is
-/// no valid record.
-std::uint64_t make_record(std::uint64_t table_seed, std::size_t place, std::uint8_t state) {
-  return (splitmix64(splitmix64(table_seed ^ place) + state) << 8 | state);
+/// A record: the state in the low byte, 56 bits of checksum over state, index and table above it. All-zero storage is
+/// not a valid record.
+std::uint64_t make_record(std::uint64_t table_seed, std::size_t index, std::uint8_t state) {
+  return (splitmix64(splitmix64(table_seed ^ index) + state) << 8 | state);
 }
 
-std::optional<std::uint8_t> record_state(std::uint64_t table_seed, std::size_t place, std::uint64_t record) {
+std::optional<std::uint8_t> record_state(std::uint64_t table_seed, std::size_t index, std::uint64_t record) {
   const auto state = static_cast<std::uint8_t>(record & 0xff);
-  if (record != make_record(table_seed, place, state)) return std::nullopt;
+  if (record != make_record(table_seed, index, state)) return std::nullopt;
   return state;
 }
 
 constexpr std::uint64_t kExposureSeed = 0x65787073ull << 32;
 constexpr std::uint64_t kWindowSeed = 0x77696e64ull << 32;
-constexpr std::uint8_t kClosed = 0, kOpen = 1;
+constexpr std::uint8_t kClosed = 0;
+constexpr std::uint8_t kOpen = 1;
 
 /// Over everything before the checksum at its end.
 template <class Block>
@@ -78,11 +80,11 @@ std::size_t window_count(std::size_t count) {
 std::size_t round_up(std::size_t bytes) {
   return (bytes + kPage - 1) / kPage * kPage;
 }
-std::size_t records_place(std::size_t count) {
+std::size_t records_offset(std::size_t count) {
   return kTables + round_up(window_count(count) * sizeof(std::uint64_t));
 }
 std::size_t storage_bytes(std::size_t count) {
-  return records_place(count) + round_up(count * sizeof(std::uint64_t));
+  return records_offset(count) + round_up(count * sizeof(std::uint64_t));
 }
 
 template <class Block>
@@ -103,15 +105,15 @@ struct Journal::Implementation {
   std::vector<std::uint64_t> windows, records;  ///< as they stand in the storage
   bool is_broken = false;  ///< a sync failed: what is durable is no longer known, so nothing more is armed
 
-  void put(std::size_t place, std::uint64_t& kept, std::uint64_t record) {
+  void put(std::size_t offset, std::uint64_t& kept, std::uint64_t record) {
     if (storage) {
       std::uint64_t copy = record;
-      storage->write(place, bytes_of(copy));
+      storage->write(offset, bytes_of(copy));
     }
     kept = record;
   }
   void set(std::size_t i, ExposureState state) {
-    put(records_place(count) + i * sizeof(std::uint64_t), records[i],
+    put(records_offset(count) + i * sizeof(std::uint64_t), records[i],
         make_record(kExposureSeed, i, static_cast<std::uint8_t>(state)));
   }
   void set_window(std::size_t w, std::uint8_t state) {
@@ -161,7 +163,7 @@ struct Journal::Implementation {
     Boot boot{};
     copy_text(boot.id, boot_id);
     boot.checksum = block_checksum(boot);
-    storage->write(kBootPlace, bytes_of(boot));
+    storage->write(kBootOffset, bytes_of(boot));
   }
 
   void fill();
@@ -181,9 +183,9 @@ void Journal::Implementation::fill() {
 void Journal::Implementation::load(const std::string& program_sha256) {
   const auto refuse = [](const char* sentence) { throw std::runtime_error(std::string("the journal ") + sentence); };
   Header header{};
-  if (storage->size() < kTables) refuse("is no journal: it is too short");
+  if (storage->size() < kTables) refuse("is not a journal: it is too short");
   storage->read(0, bytes_of(header));
-  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0) refuse("is no journal");
+  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0) refuse("is not a journal");
   if (header.version != kVersion || header.window != kWindow) refuse("was written by another version");
   if (header.checksum != block_checksum(header)) refuse("is damaged: its header fails its checksum");
   if (header.count >= kCountMax || storage_bytes(header.count) != storage->size())
@@ -193,15 +195,15 @@ void Journal::Implementation::load(const std::string& program_sha256) {
   windows.resize(window_count(count));
   records.resize(count);
   storage->read(kTables, bytes_of(windows));
-  storage->read(records_place(count), bytes_of(records));
+  storage->read(records_offset(count), bytes_of(records));
 }
 
 /// After a kill the storage is as it was: only what was armed is in doubt. After a power cut an open window's dots may
-/// have been exposed without a trace. Everything is written anew, because what an earlier sync failed to keep looks
-/// clean to the system.
+/// have been exposed without a trace. Everything is written again, because pages that an earlier sync failed to write
+/// count as clean in the system's cache.
 void Journal::Implementation::recover(const std::string& boot_id) {
   Boot boot{};
-  storage->read(kBootPlace, bytes_of(boot));
+  storage->read(kBootOffset, bytes_of(boot));
   const bool is_same_boot = !boot_id.empty() && boot.checksum == block_checksum(boot) && field_text(boot.id) == boot_id;
   for (std::size_t i = 0; i < count; ++i) {
     const bool is_closed = record_state(kWindowSeed, i / kWindow, windows[i / kWindow]) == kClosed;
@@ -211,7 +213,7 @@ void Journal::Implementation::recover(const std::string& boot_id) {
     if (state == ExposureState::kDone) ++done_count;
     records[i] = make_record(kExposureSeed, i, static_cast<std::uint8_t>(state));
   }
-  storage->write(records_place(count), bytes_of(records));
+  storage->write(records_offset(count), bytes_of(records));
   sync();
   for (std::size_t w = 0; w < windows.size(); ++w) windows[w] = make_record(kWindowSeed, w, kClosed);
   storage->write(kTables, bytes_of(windows));
@@ -258,7 +260,7 @@ Journal Journal::create(std::unique_ptr<JournalStorage> storage, std::size_t exp
   journal->storage->write(0, bytes_of(header));
   journal->write_boot(boot_id);
   journal->storage->write(kTables, bytes_of(journal->windows));
-  journal->storage->write(records_place(exposure_count), bytes_of(journal->records));
+  journal->storage->write(records_offset(exposure_count), bytes_of(journal->records));
   journal->sync();
   return Journal(std::move(journal));
 }
@@ -299,7 +301,7 @@ std::string Journal::current_boot_id() {
   return id.substr(0, sizeof(Boot::id));
 }
 
-void Journal::expect(std::size_t i) {
+void Journal::open_window_for(std::size_t i) {
   CHECK_LT(i, implementation_->count);
   implementation_->enter_window(i / kWindow);
 }
@@ -318,7 +320,7 @@ void Journal::done(std::size_t i) {
   ++implementation_->done_count;
 }
 
-void Journal::doubt(std::size_t i) {
+void Journal::mark_in_doubt(std::size_t i) {
   CHECK_LT(i, implementation_->count);
   CHECK(implementation_->get(i) == ExposureState::kArmed);
   implementation_->set(i, ExposureState::kInDoubt);

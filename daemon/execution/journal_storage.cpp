@@ -38,10 +38,10 @@ bool lock_exclusively(int fd) {
 void sync_folder(const fs::path& file) {
   const auto folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) fail_errno(folder, "can't be opened");
+  if (fd < 0) fail_errno(folder, "cannot be opened");
   const int result = ::fsync(fd);
   ::close(fd);
-  if (result != 0) fail_errno(folder, "can't be synced");
+  if (result != 0) fail_errno(folder, "cannot be synced");
 }
 
 }  // namespace
@@ -52,7 +52,7 @@ std::unique_ptr<JournalFile> JournalFile::create(const fs::path& file, std::size
   std::error_code ignored;
   fs::remove(temporary, ignored);
   created->fd_ = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
-  if (created->fd_ < 0) fail_errno(file, "can't be created");
+  if (created->fd_ < 0) fail_errno(file, "cannot be created");
   created->temporary_ = temporary;
   if (const int error = ::posix_fallocate(created->fd_, 0, static_cast<off_t>(bytes)); error != 0)
     fail(file, std::string("no room for the journal: ") + std::strerror(error));
@@ -64,10 +64,10 @@ std::unique_ptr<JournalFile> JournalFile::create(const fs::path& file, std::size
 std::unique_ptr<JournalFile> JournalFile::open(const fs::path& file) {
   std::unique_ptr<JournalFile> opened(new JournalFile(file));
   opened->fd_ = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
-  if (opened->fd_ < 0) fail_errno(file, "can't be opened");
+  if (opened->fd_ < 0) fail_errno(file, "cannot be opened");
   if (!lock_exclusively(opened->fd_)) fail(file, "is in use by another program");
   struct stat status {};
-  if (::fstat(opened->fd_, &status) != 0) fail_errno(file, "can't be read");
+  if (::fstat(opened->fd_, &status) != 0) fail_errno(file, "cannot be read");
   opened->size_ = static_cast<std::size_t>(status.st_size);
   return opened;
 }
@@ -81,7 +81,7 @@ JournalFile::~JournalFile() {
 void JournalFile::publish() {
   sync();
   // link, unlike rename, refuses to replace a journal that is already there.
-  if (::link(temporary_.c_str(), file_.c_str()) != 0) fail_errno(file_, "can't be created");
+  if (::link(temporary_.c_str(), file_.c_str()) != 0) fail_errno(file_, "cannot be created");
   ::unlink(temporary_.c_str());
   temporary_.clear();
   sync_folder(file_);
@@ -91,7 +91,7 @@ void JournalFile::read(std::size_t offset, std::span<std::uint8_t> bytes) const 
   while (!bytes.empty()) {
     const ssize_t count = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail_errno(file_, "can't be read");
+    if (count < 0) fail_errno(file_, "cannot be read");
     if (count == 0) fail(file_, "is shorter than it was");
     bytes = bytes.subspan(static_cast<std::size_t>(count));
     offset += static_cast<std::size_t>(count);
@@ -103,14 +103,14 @@ void JournalFile::write(std::size_t offset, std::span<const std::uint8_t> bytes)
   while (!bytes.empty()) {
     const ssize_t count = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) fail_errno(file_, "can't be written");
+    if (count <= 0) fail_errno(file_, "cannot be written");
     bytes = bytes.subspan(static_cast<std::size_t>(count));
     offset += static_cast<std::size_t>(count);
   }
 }
 
 void JournalFile::sync() {
-  if (::fdatasync(fd_) != 0) fail_errno(file_, "can't be synced to disk");
+  if (::fdatasync(fd_) != 0) fail_errno(file_, "cannot be synced to disk");
 }
 
 }  // namespace hilbrush

@@ -7,7 +7,7 @@
 
 /// The bytes that a journal is kept in. The journal's promises rest on two of this interface: what write() has taken
 /// survives the death of the process, and what sync() has taken survives a power cut; of what was written since, any
-/// part may be lost or torn. Tests bring storages that lose as much as they may. One thread.
+/// part may be lost or torn. Tests use storages that lose as much as is allowed. One thread.
 namespace hilbrush {
 
 class JournalStorage {

@@ -8,7 +8,8 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::uint64_t kMovesLeast = 100, kMovesOfAxisLeast = 20;
+constexpr std::uint64_t kMovesLeast = 100;
+constexpr std::uint64_t kMovesOfAxisLeast = 20;
 /// Moves that all take nearly the same time don't tell a delay from a factor: then it counts as a factor.
 constexpr double kVarietyLeast = .01;
 
@@ -16,7 +17,8 @@ constexpr double kVarietyLeast = .01;
 
 void MotionTimes::add(const CellDescription& cell, const Joints& from, const Joints& to, double seconds) {
   std::size_t slowest = 0;
-  double slowest_s = -1, promised_s = 0;
+  double slowest_s = -1;
+  double promised_s = 0;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const AxisDescription& axis = cell.axes[i];
     const double alone_s = trapezoid_s(std::abs(to[i] - from[i]), axis.speed_max, axis.acceleration_max);
@@ -26,7 +28,7 @@ void MotionTimes::add(const CellDescription& cell, const Joints& from, const Joi
     promised_s = alone_s;
   }
   if (promised_s <= 0) return;
-  // Axes are seen to arrive with the control tick; that is no fault of theirs.
+  // Axes are seen to arrive with the control tick; which is not their fault.
   if (cell.timing.tick_s > 0) promised_s = std::ceil(promised_s / cell.timing.tick_s - 1e-9) * cell.timing.tick_s;
   Sums& sums = axes_[slowest];
   ++sums.moves;
@@ -54,7 +56,8 @@ std::uint64_t MotionTimes::count() const {
 
 /// For a given delay each axis has its best factor; put in, one equation for the delay is left.
 double MotionTimes::delay_s() const {
-  double unexplained_s = 0, variety = 0;
+  double unexplained_s = 0;
+  double variety = 0;
   for (const Sums& sums : axes_) {
     if (sums.moves == 0) continue;
     unexplained_s += sums.measured - sums.promised * sums.product / sums.promised2;

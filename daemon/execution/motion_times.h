@@ -5,8 +5,8 @@
 
 #include "planner/cell_model/cell_description.h"
 
-/// What moves really take beside what the time model foresees, as the least squares of
-///   measured = delay + factor of the slowest axis * the time that its speed and acceleration promise
+/// How long moves really take, compared with the time model: least squares of
+///   measured = delay + factor of the slowest axis * the time by its speed and acceleration
 /// over all moves, in constant memory. Plain value, one thread.
 namespace hilbrush {
 
@@ -22,13 +22,16 @@ class MotionTimes {
   void add(const CellDescription& cell, const Joints& from, const Joints& to, double seconds);
   void add(const MotionTimes& other);
   std::uint64_t count() const;
-  /// Nothing before some hundred moves.
+  /// Empty before some hundred moves.
   std::optional<MeasuredMotion> measured() const;
 
  private:
   struct Sums {
     std::uint64_t moves = 0;
-    double promised = 0, measured = 0, promised2 = 0, product = 0;
+    double promised = 0;
+    double measured = 0;
+    double promised2 = 0;
+    double product = 0;
   };
   double delay_s() const;
 

@@ -45,7 +45,8 @@ void check_pose(const CellDescription& cell, const Joints& target, std::size_t e
 
 void check_pulse(const Laser::Limits& limits, const Exposure& exposure, std::size_t i) {
   constexpr double kRelative = 1e-6;  // program files keep floats
-  const double power = exposure.power_w, pulse = exposure.pulse_s;
+  const double power = exposure.power_w;
+  const double pulse = exposure.pulse_s;
   const auto within = [](double value, double low, double high) {
     return value >= low * (1 - kRelative) && value <= high * (1 + kRelative);
   };

@@ -5,10 +5,10 @@
 #include "drivers/laser.h"
 #include "planner/cell_model/exposure_program.h"
 
-/// Limits looked at again just before they matter, whatever the planner said. Pure functions, any thread.
+/// Limits that are checked again just before they matter, independently of the planner. Pure functions, any thread.
 namespace hilbrush {
 
-/// The program asks for something outside the limits: no device is to blame.
+/// The program asks for something outside the limits: no device is at fault.
 struct ProgramRefused : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

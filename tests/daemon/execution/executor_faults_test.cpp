@@ -131,9 +131,9 @@ TEST_P(AnAxisThatStandsElsewhere, IsAFaultAndSaysSo) {
   const auto result =
       world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
-  const bool is_told = result.reason.find("the table says that it is in position but stands elsewhere") == 0 ||
+  const bool is_reported = result.reason.find("the table says that it is in position but stands elsewhere") == 0 ||
                        result.reason.find("the table left its position") == 0;
-  EXPECT_TRUE(is_told) << result.reason;
+  EXPECT_TRUE(is_reported) << result.reason;
   expect_painted_once(program, journal, world.emissions());
 }
 
@@ -173,7 +173,8 @@ class BufferingRobot final : public Robot {
     waiting_.clear();
     robot_.stop();
   }
-  std::size_t most_waiting = 0, prepared = 0;
+  std::size_t most_waiting = 0;
+  std::size_t prepared = 0;
 
  private:
   /// True if nothing is under way any more.
@@ -227,7 +228,7 @@ TEST(ExecutorTest, HandsWayPointsAheadWhereOneChainMovesAlone) {
   EXPECT_NEAR(elapsed_s[0], elapsed_s[1], .05 * elapsed_s[0]) << "the same way";
 }
 
-/// Counts what it is told ahead, and that it moves there next.
+/// Counts the targets that it is sent ahead, and that it moves there next.
 class NotingTable final : public Table {
  public:
   explicit NotingTable(Table& table) : table_(table) {}
@@ -250,7 +251,8 @@ class NotingTable final : public Table {
   Status status() override { return table_.status(); }
   double expected_arrival_s() override { return table_.expected_arrival_s(); }
   void stop() noexcept override { table_.stop(); }
-  std::size_t prepared = 0, followed = 0;
+  std::size_t prepared = 0;
+  std::size_t followed = 0;
 
  private:
   Table& table_;
@@ -309,7 +311,7 @@ TEST(ExecutorTest, TellsTheLaserItsNextPowerWhileTheAxesMove) {
   expect_painted_once(program, journal, world.emissions());
 }
 
-/// A table whose word reaches nobody from the first pulse on, for so long; it drifts meanwhile.
+/// A table whose status is not received from the first pulse on, for a given time; it drifts meanwhile.
 class UnheardTable final : public Table {
  public:
   UnheardTable(Cell cell, double unheard_s) : cell_(cell), unheard_s_(unheard_s) {}
@@ -350,8 +352,8 @@ TEST(ExecutorTest, APulseIsNotBelievedByWhatWasKnownBeforeIt) {
     const auto result =
         world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
     EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
-    EXPECT_EQ(result.reason,
-              unheard_s < 1 ? "the table left its position during a pulse" : "the table has told nothing for too long");
+    EXPECT_EQ(result.reason, unheard_s < 1 ? "the table left its position during a pulse"
+                                           : "the table has sent no status for too long");
     EXPECT_EQ(journal.in_doubt(), std::vector<std::size_t>{0});
     EXPECT_EQ(journal.done_count(), 0u);
   }

@@ -24,11 +24,11 @@ TEST(ExecutorTest, PaintsEveryDotOnce) {
   WitnessedCell world;
   const auto program = small_program(1000);
   Journal journal = Journal::in_memory(1000);
-  std::size_t told = 0;
-  const auto result = world.paint(program, journal, [&](std::size_t done) { EXPECT_EQ(done, ++told); });
+  std::size_t reported = 0;
+  const auto result = world.paint(program, journal, [&](std::size_t done) { EXPECT_EQ(done, ++reported); });
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(result.exposed, 1000u);
-  EXPECT_EQ(told, 1000u);
+  EXPECT_EQ(reported, 1000u);
   EXPECT_EQ(journal.done_count(), 1000u);
   EXPECT_GT(result.elapsed_s, 1000 * .025);
   expect_painted_once(program, journal, world.emissions());
@@ -47,7 +47,7 @@ TEST(ExecutorTest, PassesDotsOverInTheDark) {
   Journal journal = Journal::in_memory(300);
   for (std::size_t i : {0u, 7u, 100u, 101u, 102u, 299u}) {
     journal.arm(i);
-    journal.doubt(i);
+    journal.mark_in_doubt(i);
   }
   const auto result = world.paint(program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;

@@ -36,7 +36,7 @@ enum class Kind {
   kThrows,         ///< the call fails with a DriverError and has no effect
   kThrowsLate,     ///< it has its effect, and fails then: a lost acknowledgement
   kThrowsMemory,   ///< std::bad_alloc
-  kThrowsOddly,    ///< something that is no std::exception
+  kThrowsOddly,    ///< something that is not a std::exception
   kFault,          ///< from now on the device reports a fault
   kLostLink,       ///< from now on it reports that it is disconnected
   kStalePosition,  ///< the next statuses say "in position" of the move before

@@ -64,7 +64,7 @@ TEST(JournalTest, KeepsStatesInMemory) {
   EXPECT_EQ(journal.state(0), ExposureState::kArmed);
   journal.done(0);
   journal.arm(2);
-  journal.doubt(2);
+  journal.mark_in_doubt(2);
   EXPECT_EQ(journal.state(0), ExposureState::kDone);
   EXPECT_EQ(journal.state(1), ExposureState::kRemaining);
   EXPECT_EQ(journal.done_count(), 1u);
@@ -129,7 +129,7 @@ TEST(JournalTest, DoubtsOutliveReopeningAndCanBeExposedAgainOnce) {
     Journal journal = Journal::create(folder / "journal", 10, kProgram);
     paint(journal, 0, 3);
     journal.arm(3);
-    journal.doubt(3);
+    journal.mark_in_doubt(3);
     paint(journal, 4, 6);
   }
   {

@@ -46,7 +46,8 @@ struct Disk {
   /// each sector.
   void cut_power(std::mt19937& random) {
     for (const std::size_t page : dirty) {
-      const auto begin = page * kPage, end = begin + kPage;
+      const auto begin = page * kPage;
+      const auto end = begin + kPage;
       const auto keep = [&](std::size_t from, std::size_t to) {
         std::copy(current.begin() + static_cast<std::ptrdiff_t>(from),
                   current.begin() + static_cast<std::ptrdiff_t>(to),
@@ -156,14 +157,14 @@ class Part {
         }
     for (std::size_t i = 0; i < count_; ++i) {
       if (journal.state(i) != ExposureState::kRemaining) continue;
-      journal.expect(i);
+      journal.open_window_for(i);
       journal.arm(i);
       EXPECT_TRUE(light_[i] == 0 || ordered_.contains(i)) << "dot " << i << " is exposed twice";
       ordered_.erase(i);
       ++light_[i];
       if (random_() % 100 == 0) {
         ++doubts_of_run_;
-        journal.doubt(i);
+        journal.mark_in_doubt(i);
       } else {
         journal.done(i);
       }
@@ -199,7 +200,9 @@ class Part {
   std::mt19937 random_;
   std::vector<int> light_;         ///< how often each dot was really exposed
   std::set<std::size_t> ordered_;  ///< in doubt, and ordered again
-  std::size_t boots_ = 0, doubts_before_ = 0, doubts_of_run_ = 0;
+  std::size_t boots_ = 0;
+  std::size_t doubts_before_ = 0;
+  std::size_t doubts_of_run_ = 0;
 };
 
 TEST(PowerCutTest, WhateverTheDiskKeptNoDotIsExposedTwiceOrForgotten) {
@@ -264,7 +267,8 @@ TEST(PowerCutTest, AFullDiskStopsTheJobBeforeTheDotNotInIt) {
   for (std::uint64_t operation = 0; operation < 1200; operation += operation < 20 ? 1 : 97) {
     SCOPED_TRACE("operation " + std::to_string(operation));
     SimCell sim(description, {.laser_start_delay_s = 0});
-    std::size_t pulses = 0, cut_pulses = 0;
+    std::size_t pulses = 0;
+    std::size_t cut_pulses = 0;
     sim.set_emission_sink([&](const Emission& emission) {
       ++pulses;
       cut_pulses += emission.length_s < emission.commanded_s;
