@@ -29,7 +29,7 @@ fs::path made_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder))
-    throw std::runtime_error(folder.string() + ": can't be made or is no folder" +
+    throw std::runtime_error(folder.string() + ": cannot be made or is not a folder" +
                              (error ? ": " + error.message() : ""));
   return fs::canonical(folder);
 }
@@ -41,14 +41,15 @@ CellDescription described_cell(const fs::path& file, const std::optional<double>
   if (!is_simulated && description.simulation.time_scale <= 0) description.simulation.time_scale = 1;
   if (!time_scale) return description;
   if (!(*time_scale >= 0 && *time_scale <= 1000)) throw InputError("--time-scale", "must be 0 to 1000");
-  if (!is_simulated) throw InputError("--time-scale", "is for simulated cells only: real time can't be scaled");
+  if (!is_simulated) throw InputError("--time-scale", "is for simulated cells only: real time cannot be scaled");
   description.simulation.time_scale = *time_scale;
   return description;
 }
 
 }  // namespace
 
-/// Built from top to bottom, taken down from bottom to top: threads that call back end before what they call.
+/// Built from top to bottom, destroyed from bottom to top. Threads that call
+/// back have their own copies of what they call.
 struct Daemon::Implementation {
   DaemonOptions options;
   fs::path state;
@@ -80,7 +81,7 @@ struct Daemon::Implementation {
         cell_file(fs::absolute(find_cell(given.cell))),
         description(described_cell(cell_file, given.time_scale)),
         access(given.settings),
-        store(state / "jobs.sqlite", &notice),
+        store(state / "jobs.sqlite"),
         audit(state / "audit.log"),
         devices(given.make_devices ? given.make_devices(description) : make_cell_devices(description, cell_file)),
         thread(*devices, description, post),
@@ -99,14 +100,15 @@ struct Daemon::Implementation {
       audit.record(self, "cell.stop", Json::object(), reason);
     };
     queue.on_change = [this](const Job& job) { server.notify(job); };
+    notice = store.notice();
     if (const std::string found = queue.restore(); !found.empty()) notice += (notice.empty() ? "" : "; ") + found;
     painting.restore();
     planning.plan_next();
     server.listen(options.socket, {methods, queue, access});
     if (const auto& tcp = options.settings.tcp)
       tcp_address = tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, queue, access}));
-    constexpr double kLookS = .05;
-    server.every(kLookS, [this] { controller.look_at_devices(); });
+    constexpr double kDevicePollS = .05;
+    server.every(kDevicePollS, [this] { controller.check_devices(); });
   }
 
   Json info() const {
@@ -134,8 +136,8 @@ struct Daemon::Implementation {
     planning.shut_down();
     painting.shut_down();
     constexpr double kPeriodS = 0.01;
-    constexpr auto kPatience = std::chrono::seconds(10);
-    server.poll(kPeriodS, [this, deadline = std::chrono::steady_clock::now() + kPatience] {
+    constexpr auto kEndPatience = std::chrono::seconds(10);
+    server.poll(kPeriodS, [this, deadline = std::chrono::steady_clock::now() + kEndPatience] {
       if ((thread.is_busy() || painting.is_painting()) && std::chrono::steady_clock::now() < deadline) return false;
       server.end_run();
       return true;

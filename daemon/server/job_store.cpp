@@ -191,8 +191,7 @@ struct JobStore::Implementation {
   }
 };
 
-JobStore::JobStore(const std::filesystem::path& file, std::string* set_aside)
-    : implementation_(std::make_unique<Implementation>()) {
+JobStore::JobStore(const std::filesystem::path& file) : implementation_(std::make_unique<Implementation>()) {
   is_new_ = !std::filesystem::exists(file);
   try {
     implementation_->database = open_checked(file);
@@ -202,9 +201,8 @@ JobStore::JobStore(const std::filesystem::path& file, std::string* set_aside)
       throw std::runtime_error(file.string() + ": no job store can be made: " + error.what());
     const auto aside = set_file_aside(file);
     is_new_ = true;
-    if (set_aside != nullptr)
-      *set_aside = file.string() + " can't be used (" + error.what() + "); it was set aside as " +
-                   aside.filename().string() + ", and the jobs are taken from the records in their folders";
+    notice_ = file.string() + " cannot be used (" + error.what() + "); it was set aside as " +
+              aside.filename().string() + ", and the jobs are taken from the records in their folders";
   }
   try {
     implementation_->database = open_checked(file);

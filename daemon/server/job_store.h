@@ -14,15 +14,17 @@ namespace hilbrush {
 
 class JobStore {
  public:
-  /// A file that is no database, damaged, or of a newer daemon is set aside under another name, so that the daemon
-  /// starts; `set_aside` then says so. @throws std::runtime_error if no database can be made there.
-  JobStore(const std::filesystem::path& file, std::string* set_aside);
+  /// A file that is not a database, is damaged, or of a newer daemon is set aside under another name, so that the
+  /// daemon starts; notice() then says so. @throws std::runtime_error if no database can be made there.
+  explicit JobStore(const std::filesystem::path& file);
   ~JobStore();
   JobStore(const JobStore&) = delete;
   JobStore& operator=(const JobStore&) = delete;
 
   /// True if the file was not there, or could not be used: it is empty now.
   bool is_new() const { return is_new_; }
+  /// For the operator: why an earlier file was set aside; or empty.
+  const std::string& notice() const { return notice_; }
   /// Gives the job its id. What is stored survives the daemon's death; a power cut may take the last moments.
   void insert(Job& job);
   /// Under the id it has; nothing happens if that, or its key, is taken.
@@ -38,6 +40,7 @@ class JobStore {
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
   bool is_new_ = false;
+  std::string notice_;
 };
 
 }  // namespace hilbrush

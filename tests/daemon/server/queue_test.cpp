@@ -103,7 +103,7 @@ TEST(ServerQueueTest, CopiesArePaintedOneAfterAnotherEachOnItsOwnPart) {
     const Json job = world.wait_for(*connected, id, copy == 3 ? "done" : "ready");
     EXPECT_EQ(job.at("copies_done"), copy);
     EXPECT_EQ(job.at("dots").at("exposed"), copy == 3 ? 120 : 0) << "the counts are those of the present part";
-    EXPECT_EQ(connected->result("cell.status").at("cell").at("state"), "idle") << "armed for each part anew";
+    EXPECT_EQ(connected->result("cell.status").at("cell").at("state"), "idle") << "armed again for each part";
     if (copy == 2) {
       world.end();
       world.begin();
@@ -253,10 +253,9 @@ constexpr const char* kFirstSchema = R"(
 TEST(JobStoreTest, AnOldSchemaIsMigratedAndNothingIsLost) {
   const test::TemporaryFolder folder;
   execute_sql(folder / "jobs.sqlite", kFirstSchema);
-  std::string set_aside;
   {
-    JobStore store(folder / "jobs.sqlite", &set_aside);
-    EXPECT_EQ(set_aside, "");
+    JobStore store(folder / "jobs.sqlite");
+    EXPECT_EQ(store.notice(), "");
     EXPECT_FALSE(store.is_new());
     const auto jobs = store.load_recent(10);
     ASSERT_EQ(jobs.size(), 3u);
@@ -278,23 +277,22 @@ TEST(JobStoreTest, AnOldSchemaIsMigratedAndNothingIsLost) {
     store.insert(job);
     EXPECT_EQ(job.id, 7);
   }
-  JobStore again(folder / "jobs.sqlite", &set_aside);
+  JobStore again(folder / "jobs.sqlite");
   EXPECT_EQ(again.load_recent(10).size(), 4u);
-  EXPECT_EQ(set_aside, "");
+  EXPECT_EQ(again.notice(), "");
 }
 
 TEST(JobStoreTest, AStoreOfANewerDaemonIsSetAsideWithASentence) {
   const test::TemporaryFolder folder;
   execute_sql(folder / "jobs.sqlite", "CREATE TABLE job (id INTEGER); PRAGMA user_version = 99;");
-  std::string set_aside;
-  JobStore store(folder / "jobs.sqlite", &set_aside);
-  EXPECT_NE(set_aside.find("newer"), std::string::npos);
+  JobStore store(folder / "jobs.sqlite");
+  EXPECT_NE(store.notice().find("newer"), std::string::npos);
   EXPECT_TRUE(store.is_new());
 }
 
 TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
   const test::TemporaryFolder folder;
-  JobStore store(folder / "jobs.sqlite", nullptr);
+  JobStore store(folder / "jobs.sqlite");
   for (int i = 0; i < 20; ++i) {
     Job job;
     job.state = i == 4 ? JobState::kReady : JobState::kDone;
@@ -316,7 +314,7 @@ TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobo
   DaemonWorld world;
   {
     std::filesystem::create_directories(world.options.state);
-    JobStore store(world.options.state / "jobs.sqlite", nullptr);
+    JobStore store(world.options.state / "jobs.sqlite");
     for (std::size_t i = 0; i < JobQueue::kHistoryMax; ++i) {
       Job job;
       job.state = JobState::kDone;
