@@ -26,24 +26,24 @@ using namespace hilbrush;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kStillOn = 3 };
 
-/// For the last words of a dying process: the raw link, and what turns the laser off.
+/// For a process that crashes: the raw link, and the commands that turn the laser off, of both laser heads.
 std::atomic<const LineLaser*> g_laser{nullptr};
-constexpr std::string_view kLastWords = "\r\nSOUR:AM:STAT OFF\r\n!d\rl0\r";
+constexpr std::string_view kOffCommands = "\r\nSOUR:AM:STAT OFF\r\n!d\rl0\r";
 
-/// Only what may be called from a signal handler. Both lasers' words are said: what one doesn't know it refuses.
-void say_last_words(int signal) {
+/// Calls only what is safe in a signal handler. A laser refuses the command of the other one.
+void turn_laser_off(int signal) {
   if (const LineLaser* laser = g_laser.load())
     if (const int fd = laser->descriptor(); fd >= 0) {
-      [[maybe_unused]] const ssize_t written = ::write(fd, kLastWords.data(), kLastWords.size());
+      [[maybe_unused]] const ssize_t written = ::write(fd, kOffCommands.data(), kOffCommands.size());
     }
   ::signal(signal, SIG_DFL);
   ::raise(signal);
 }
 
-/// Signals that mean "end" are read from a descriptor; those that mean "broken" say the last words at once.
+/// Signals that mean "end" are read from a descriptor; those that mean "crashed" turn the laser off at once.
 int catch_signals() {
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP, SIGXCPU, SIGXFSZ})
-    ::signal(signal, say_last_words);
+    ::signal(signal, turn_laser_off);
   ::signal(SIGPIPE, SIG_IGN);
   sigset_t set;
   ::sigemptyset(&set);

@@ -26,27 +26,27 @@ using hilbrush::DaemonOptions;
 
 enum ExitCode { kOk = 0, kInternal = 1, kUsage = 2, kBadInput = 3 };
 
-/// For the last words of a dying process: whatever else is broken, the beam must be off.
+/// For a process that is about to abort: whatever has failed, the beam must be off.
 std::atomic<Daemon*> g_daemon{nullptr};
 
 void disarm() noexcept {
   if (Daemon* daemon = g_daemon.exchange(nullptr)) daemon->laser_off();
 }
 
-void darken_and_abort(const std::string& message) {
+void disarm_and_abort(const std::string& message) {
   disarm();
   spdlog::critical("{}", message);
   std::abort();
 }
 
-void darken_and_terminate() {
+void disarm_and_terminate() {
   disarm();
   spdlog::critical("an exception escaped");
   std::abort();
 }
 
 /// Beside this program, where both the build and the installation put it.
-std::filesystem::path pipeline_beside_me() {
+std::filesystem::path pipeline_beside_program() {
   std::error_code error;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
   return error ? std::filesystem::path("hilbrush-pipeline") : self.parent_path() / "hilbrush-pipeline";
@@ -61,13 +61,13 @@ void raise_descriptor_limit() {
 }
 
 int serve(const DaemonOptions& options) {
-  hilbrush::set_check_handler(darken_and_abort);
-  std::set_terminate(darken_and_terminate);
+  hilbrush::set_check_handler(disarm_and_abort);
+  std::set_terminate(disarm_and_terminate);
   Daemon daemon(options);
   g_daemon.store(&daemon);
   if (!daemon.notice().empty()) spdlog::warn("{}", daemon.notice());
   daemon.end_on_signals([] { ::sd_notify(0, "STOPPING=1"); });
-  // The watchdog is fed from the thread that serves requests: a daemon that can't be told to stop is ended.
+  // The watchdog is fed from the thread that serves requests: a daemon that cannot receive a stop is ended.
   if (std::uint64_t period_us = 0; ::sd_watchdog_enabled(0, &period_us) > 0)
     daemon.every(static_cast<double>(period_us) / 2e6, [] { ::sd_notify(0, "WATCHDOG=1"); });
   const std::string tcp = daemon.tcp_address().empty() ? "" : " and " + daemon.tcp_address();
@@ -88,8 +88,9 @@ int main(int argc, char** argv) {
   DaemonOptions options;
   options.socket = "/run/hilbrush/hilbrush.sock";
   options.state = "/var/lib/hilbrush";
-  options.pipeline = pipeline_beside_me();
-  std::string level = "info", settings;
+  options.pipeline = pipeline_beside_program();
+  std::string level = "info";
+  std::string settings;
   app.add_option("--socket", options.socket, "Unix socket to listen on (mode 0660)")->capture_default_str();
   app.add_option("--state", options.state, "folder for jobs, their files and the audit log")->capture_default_str();
   app.add_option("--settings", settings, "JSON file: who may connect, TCP (default: the socket's group may, no TCP)");
@@ -99,7 +100,7 @@ int main(int argc, char** argv) {
       "wall seconds of one second of a simulated cell: 1 real time, 0 as fast as possible (default: the cell file's)");
   app.add_option("--pipeline", options.pipeline, "the program hilbrush-pipeline")->capture_default_str();
   app.add_option("--pipeline-silence-s", options.pipeline_silence_s,
-                 "a pipeline that makes no progress for so long is killed")
+                 "a pipeline that makes no progress for this long is killed")
       ->check(CLI::Range(0.1, 86400.))
       ->capture_default_str();
   app.add_option("--pipeline-memory-mb", options.pipeline_memory_mb, "a pipeline that needs more memory is killed")
@@ -117,7 +118,7 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("hilbrushd"));
   spdlog::set_level(spdlog::level::from_str(level));
   ::signal(SIGPIPE, SIG_IGN);
-  ::signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write, and no end of the daemon
+  ::signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write, and does not end the daemon
   raise_descriptor_limit();
   try {
     if (!settings.empty()) options.settings = hilbrush::load_daemon_settings(settings);

@@ -18,7 +18,7 @@ class Access {
 
   /// A process on this machine; `groups` are all that it is in.
   Peer local_peer(uid_t uid, gid_t gid, pid_t pid, const std::vector<gid_t>& groups) const;
-  /// Whoever brings this token over TCP, or nobody. Takes the same time whatever the token is.
+  /// The owner of a token that came over TCP; empty if there is none. Takes the same time whatever the token is.
   std::optional<Peer> token_peer(const std::string& token, const std::string& address) const;
 
  private:

@@ -1,11 +1,11 @@
 #include "daemon/server/audit_log.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/time.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <stdexcept>
@@ -13,24 +13,23 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kSummaryBytes = 300;
+constexpr std::size_t kSummaryBytesMax = 300;
 
 std::string utc_now_ms() {
   timeval now{};
   ::gettimeofday(&now, nullptr);
   std::tm utc{};
   ::gmtime_r(&now.tv_sec, &utc);
-  char text[40], whole[48];
+  char text[40];
   std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
-  std::snprintf(whole, sizeof whole, "%s.%03dZ", text, static_cast<int>(now.tv_usec / 1000));
-  return whole;
+  return fmt::format("{}.{:03}Z", text, now.tv_usec / 1000);
 }
 
 }  // namespace
 
 AuditLog::AuditLog(const std::filesystem::path& file)
     : fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0640)) {
-  if (fd_ < 0) throw std::runtime_error(file.string() + ": can't be opened: " + std::strerror(errno));
+  if (fd_ < 0) throw std::runtime_error(file.string() + ": cannot be opened: " + std::strerror(errno));
 }
 
 AuditLog::~AuditLog() {
@@ -40,9 +39,9 @@ AuditLog::~AuditLog() {
 void AuditLog::record(const Peer& peer, const std::string& method, const Json& params,
                       const std::string& result) noexcept {
   try {
-    std::string summary =
-        params.dump(-1, ' ', true, Json::error_handler_t::replace);  // ASCII: control characters can't forge lines
-    if (summary.size() > kSummaryBytes) summary.resize(kSummaryBytes);
+    // ASCII: control characters cannot forge lines.
+    std::string summary = params.dump(-1, ' ', true, Json::error_handler_t::replace);
+    if (summary.size() > kSummaryBytesMax) summary.resize(kSummaryBytesMax);
     Json line{{"time", utc_now_ms()}, {"user", peer.user}, {"uid", peer.uid}, {"pid", peer.pid}};
     if (!peer.address.empty()) line["address"] = peer.address;
     line["method"] = method;

@@ -18,8 +18,8 @@ class AuditLog {
   AuditLog(const AuditLog&) = delete;
   AuditLog& operator=(const AuditLog&) = delete;
 
-  /// `result`: "ok" or the fault's sentence. A line that can't be written is lost: a full disk must not keep anyone
-  /// from stopping the cell.
+  /// `result`: "ok" or the fault's sentence. A line that cannot be written is lost: a full disk must not keep the
+  /// cell from being stopped.
   void record(const Peer& peer, const std::string& method, const Json& params, const std::string& result) noexcept;
 
  private:

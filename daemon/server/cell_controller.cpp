@@ -47,13 +47,13 @@ void CellController::refuse(const std::string& act) const {
 
 void CellController::stop(const std::string& reason, Reply reply) {
   state_ = State::kStopped;
-  is_laser_proved_off_ = false;
+  is_laser_off_verified_ = false;
   reason_ = reason;
   job_.clear();
   ++stops_;
   if (!reply.result && on_own_stop) on_own_stop(reason);
   thread_.stop([this, reply = std::move(reply)](bool is_laser_off) {
-    is_laser_proved_off_ = is_laser_off;
+    is_laser_off_verified_ = is_laser_off;
     if (reply.result) reply.result(status());
     note_executor_at_rest();
   });
@@ -64,7 +64,7 @@ void CellController::stop(const std::string& reason, Reply reply) {
   if (on_stop) on_stop();
 }
 
-void CellController::look_at_devices() {
+void CellController::check_devices() {
   if (state_ != State::kIdle && state_ != State::kArmed) return;
   const Cell cell = devices_.cell();
   const auto check_axes = [this](const char* name, const auto& axes) {
@@ -97,7 +97,7 @@ void CellController::note_executor_at_rest() {
   begin_clear(*std::exchange(waiting_clear_, std::nullopt));
 }
 
-CellThread::Done CellController::end_of_act(Reply reply, State reached, const char* overtaken) {
+CellThread::OnActEnd CellController::end_of_act(Reply reply, State reached, const char* overtaken) {
   return [this, reply = std::move(reply), reached, overtaken, stops = stops_](const std::optional<CellFault>& fault) {
     if (stops != stops_) return reply.fault({kRpcWrongState, overtaken, ""});
     finish_act(reply, reached, fault);
@@ -124,7 +124,7 @@ void CellController::home(Reply reply) {
   thread_.home(end_of_act(std::move(reply), before, "the cell was stopped on its way home"));
 }
 
-/// A device that fails stops the cell: the operator looks, then clears.
+/// A device that fails stops the cell: the operator inspects it, then clears.
 void CellController::finish_act(const Reply& reply, State reached, const std::optional<CellFault>& fault) {
   if (fault) {
     stop(fault->sentence);
@@ -158,7 +158,7 @@ Json CellController::status() {
   const auto laser = cell.laser.status();
   Json json;
   json["state"] = state_name();
-  json["laser"] = laser.is_emitting ? "on" : is_laser_proved_off_ ? "off" : "unconfirmed";
+  json["laser"] = laser.is_emitting ? "on" : is_laser_off_verified_ ? "off" : "unconfirmed";
   json["interlock"] = laser.interlock_closed ? "closed" : "open";
   json["job"] = job_.empty() ? Json(nullptr) : Json(job_);
   json["reason"] = state_ == State::kStopped ? Json(reason_) : Json(nullptr);

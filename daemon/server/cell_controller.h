@@ -11,7 +11,7 @@
 /// Socket thread only.
 namespace hilbrush {
 
-/// How a request is answered that takes a while.
+/// The answer to a request that takes a while.
 struct Reply {
   std::function<void(Json result)> result;
   std::function<void(RpcFault fault)> fault;
@@ -42,11 +42,11 @@ class CellController {
 
   /// Called after every stop; set once.
   std::function<void()> on_stop;
-  /// Called after a stop that nobody asked for over the socket, with its reason; set once.
+  /// Called after a stop that did not come over the socket, with its reason; set once.
   std::function<void(const std::string& reason)> on_own_stop;
-  /// Devices are looked at while nothing runs that would: one that fails at rest stops the cell, and so does an
-  /// interlock that is opened while the laser is armed. To be called several times a second.
-  void look_at_devices();
+  /// Checks the devices while no executor does: one that fails at rest stops the cell, and so does an interlock that is
+  /// opened while the laser is armed. To be called several times a second.
+  void check_devices();
   /// Why the cell is stopped.
   const std::string& reason() const { return reason_; }
   /// To be called when the executor's thread has answered: a clear that waited for it begins.
@@ -56,7 +56,7 @@ class CellController {
   void begin_clear(Reply reply);
   /// What answers `reply` when the act that is ordered now has ended: with the state that it `reached`, or, if a stop
   /// came between, with the sentence `overtaken`.
-  CellThread::Done end_of_act(Reply reply, State reached, const char* overtaken);
+  CellThread::OnActEnd end_of_act(Reply reply, State reached, const char* overtaken);
   void finish_act(const Reply& reply, State reached, const std::optional<CellFault>& fault);
   [[noreturn]] void refuse(const std::string& act) const;
 
@@ -66,7 +66,7 @@ class CellController {
   State state_ = State::kStopped;
   std::string reason_ = "the daemon has just started";  ///< why it is stopped
   std::string job_;                                     ///< that paints
-  bool is_laser_proved_off_ = true;
+  bool is_laser_off_verified_ = true;
   std::optional<Reply> waiting_clear_;
   unsigned stops_ = 0;  ///< tells an act that it was overtaken by a stop
 };

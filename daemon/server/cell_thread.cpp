@@ -20,10 +20,10 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-constexpr auto kTellInterval = std::chrono::milliseconds(100);
+constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 constexpr double kAtRest = 1e-6;  ///< rad or m: the axes are still where the approach begins
 
-/// The job's own files are to blame.
+/// The job's own files are at fault.
 struct JobFilesFault : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -41,7 +41,7 @@ void sync_file_system(const std::filesystem::path& folder) {
   const bool is_synced = fd >= 0 && ::syncfs(fd) == 0;
   const int error = errno;
   if (fd >= 0) ::close(fd);
-  if (!is_synced) throw std::runtime_error(folder.string() + ": can't be synced to disk: " + std::strerror(error));
+  if (!is_synced) throw std::runtime_error(folder.string() + ": cannot be synced to disk: " + std::strerror(error));
 }
 
 void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
@@ -84,32 +84,32 @@ bool CellThread::stop_now() noexcept {
   return request_stop(cell_, control_);
 }
 
-void CellThread::stop(std::function<void(bool)> done) {
+void CellThread::stop(std::function<void(bool)> on_end) {
   control_.stop.store(true);
   ++orders_under_way_;
   {
     const std::lock_guard lock(mutex_);
-    stops_.push_back(std::move(done));
+    stops_.push_back(std::move(on_end));
   }
   woken_.notify_all();
 }
 
-/// Stops that were asked for meanwhile are carried out together. What the executor was just about to tell a device when
-/// the stop came (a reference run may take a minute) is stopped again, until the executor is at rest.
+/// Stops that were ordered meanwhile are carried out together. A command that the executor was about to send when the
+/// stop came (a reference run may take a minute) is stopped again, until the executor is at rest.
 void CellThread::carry_out_stops() {
   for (;;) {
-    std::vector<std::function<void(bool)>> asked;
+    std::vector<std::function<void(bool)>> ordered;
     {
       std::unique_lock lock(mutex_);
       woken_.wait(lock, [this] { return is_ending_ || !stops_.empty(); });
       if (is_ending_) return;
-      asked.swap(stops_);
+      ordered.swap(stops_);
     }
     const bool is_off = stop_now();
-    for (auto& done : asked)
-      post_([this, is_off, done = std::move(done)] {
+    for (auto& on_end : ordered)
+      post_([this, is_off, on_end = std::move(on_end)] {
         --orders_under_way_;
-        done(is_off);
+        on_end(is_off);
       });
     constexpr auto kAgain = std::chrono::milliseconds(20);
     std::unique_lock lock(mutex_);
@@ -160,7 +160,7 @@ void CellThread::order(Work work, Answer answer) {
   });
 }
 
-void CellThread::act(std::function<void()> work, Done done) {
+void CellThread::act(std::function<void()> work, OnActEnd on_end) {
   order(
       [work = std::move(work)]() -> std::optional<CellFault> {
         try {
@@ -170,7 +170,7 @@ void CellThread::act(std::function<void()> work, Done done) {
           return CellFault{error.what(), false};
         }
       },
-      std::move(done));
+      std::move(on_end));
 }
 
 /// Called between any two steps of an act that a stop may overtake.
@@ -178,8 +178,8 @@ void CellThread::check_stop() const {
   if (control_.stop.load()) throw DriverError("the cell was stopped");
 }
 
-void CellThread::clear(Done done) {
-  act([this] { clear_devices(); }, std::move(done));
+void CellThread::clear(OnActEnd on_end) {
+  act([this] { clear_devices(); }, std::move(on_end));
 }
 
 void CellThread::clear_devices() {
@@ -201,11 +201,11 @@ void CellThread::clear_devices() {
   enable(cell_.table);
 }
 
-void CellThread::arm(Done done) {
-  act([this] { arm_devices(); }, std::move(done));
+void CellThread::arm(OnActEnd on_end) {
+  act([this] { arm_devices(); }, std::move(on_end));
 }
 
-/// Those that have lost their reference.
+/// Of the axes that have lost theirs.
 void CellThread::find_references() {
   const auto home = [this](auto& axes) {
     check_stop();
@@ -216,7 +216,7 @@ void CellThread::find_references() {
   check_stop();
 }
 
-/// A stop may come at any instant of this: its flag is looked at after emission has been armed, so that one of the two
+/// A stop may come at any instant of this: its flag is checked after emission has been armed, so that one of the two
 /// always undoes it.
 void CellThread::arm_devices() {
   find_references();
@@ -233,8 +233,8 @@ void CellThread::arm_devices() {
   check_ready("laser", cell_.laser.status());
 }
 
-void CellThread::home(Done done) {
-  act([this] { travel_home(); }, std::move(done));
+void CellThread::home(OnActEnd on_end) {
+  act([this] { travel_home(); }, std::move(on_end));
 }
 
 void CellThread::travel_home() {
@@ -271,12 +271,13 @@ CellThread::Loaded CellThread::load(const PaintOrder& order) const {
   }
   check_provenance(program.provenance, order, description_);
   const std::string sha256 = program_sha256(program_file);
-  // What is wrong with a journal may be mended; the job stays resumable.
+  // A damaged journal may be repaired; the job stays resumable.
   const bool is_new = !std::filesystem::exists(journal_file);
   if (is_new && !order.may_create_journal)
-    throw std::runtime_error(journal_file.string() +
-                             ": the journal is missing, so nobody knows what was exposed: this part can't be finished; "
-                             "cancel the job and submit it again for a new part");
+    throw std::runtime_error(
+        journal_file.string() +
+        ": the journal is missing, so it is unknown what was exposed: this part cannot be finished; "
+        "cancel the job and submit it again for a new part");
   if (is_new) sync_file_system(order.folder);
   Journal journal =
       is_new ? Journal::create(journal_file, program.exposures.size(), sha256) : Journal::open(journal_file, sha256);
@@ -291,7 +292,7 @@ PaintTally CellThread::tally(const Loaded& loaded) {
   return tally;
 }
 
-void CellThread::prepare(PaintOrder wanted, std::function<void(Prepared)> done) {
+void CellThread::prepare(PaintOrder wanted, std::function<void(Prepared)> on_end) {
   order(
       [this, wanted = std::move(wanted)]() -> Prepared {
         Prepared prepared;
@@ -312,11 +313,11 @@ void CellThread::prepare(PaintOrder wanted, std::function<void(Prepared)> done) 
         }
         return prepared;
       },
-      std::move(done));
+      std::move(on_end));
 }
 
 void CellThread::paint(std::vector<Joints> approach, std::function<void(std::size_t)> on_progress,
-                       std::function<void(ExecutionResult, PaintTally)> done) {
+                       std::function<void(ExecutionResult, PaintTally)> on_end) {
   using Painted = std::pair<ExecutionResult, PaintTally>;
   order(
       [this, approach = std::move(approach), on_progress = std::move(on_progress)]() -> Painted {
@@ -326,12 +327,12 @@ void CellThread::paint(std::vector<Joints> approach, std::function<void(std::siz
         const bool is_at_rest = std::equal(now.begin(), now.end(), loaded_->from.begin(),
                                            [](double a, double b) { return std::abs(a - b) <= kAtRest; });
         if (is_at_rest) {
-          auto last_told = Steady::now();
+          auto last_report = Steady::now();
           result = execute(loaded_->program, approach, cell_, description_, loaded_->journal, control_,
                            [&](std::size_t exposed) {
                              const auto time = Steady::now();
-                             if (time - last_told < kTellInterval) return;
-                             last_told = time;
+                             if (time - last_report < kProgressInterval) return;
+                             last_report = time;
                              post_([on_progress, exposed] { on_progress(exposed); });
                            });
         } else {
@@ -349,7 +350,7 @@ void CellThread::paint(std::vector<Joints> approach, std::function<void(std::siz
         loaded_.reset();
         return painted;
       },
-      [done = std::move(done)](Painted painted) { done(std::move(painted.first), std::move(painted.second)); });
+      [on_end = std::move(on_end)](Painted painted) { on_end(std::move(painted.first), std::move(painted.second)); });
 }
 
 void CellThread::release() {
@@ -357,12 +358,12 @@ void CellThread::release() {
     loaded_.reset();
     try {
       devices_.record_emissions({});
-    } catch (const std::exception&) {  // closing a record can't fail in a way that matters here
+    } catch (const std::exception&) {  // closing a record cannot fail in a way that matters here
     }
   });
 }
 
-void CellThread::inspect(PaintOrder wanted, std::function<void(std::optional<PaintTally>)> done) {
+void CellThread::inspect(PaintOrder wanted, std::function<void(std::optional<PaintTally>)> on_end) {
   order(
       [this, wanted = std::move(wanted)]() -> std::optional<PaintTally> {
         try {
@@ -371,7 +372,7 @@ void CellThread::inspect(PaintOrder wanted, std::function<void(std::optional<Pai
           return std::nullopt;
         }
       },
-      std::move(done));
+      std::move(on_end));
 }
 
 }  // namespace hilbrush

@@ -23,7 +23,7 @@ namespace hilbrush {
 /// Hands a closure to the socket thread. Any thread.
 using PostToSocketThread = std::function<void(std::function<void()>)>;
 
-/// What to paint, and what its program must have been made from.
+/// What to paint, and where its program must come from.
 struct PaintOrder {
   std::filesystem::path folder;  ///< program.ply, and for each copy a journal and emissions
   std::string model_sha256, settings_sha256;
@@ -32,7 +32,7 @@ struct PaintOrder {
   bool exposes_in_doubt = false;    ///< the operator orders the dots in doubt again
 };
 
-/// A file of the order's copy: the first copy's bear no number.
+/// A file of the order's copy: the first copy's have no number.
 std::filesystem::path copy_file(const PaintOrder& order, const char* stem, const char* extension);
 
 /// How far a job is, by its journal.
@@ -44,7 +44,7 @@ struct PaintTally {
 /// Why an order was not carried out.
 struct CellFault {
   std::string sentence;
-  bool is_program_at_fault = false;  ///< the job's files are to blame, not the cell
+  bool is_program_at_fault = false;  ///< the job's files are at fault, not the cell
 };
 
 struct Prepared {
@@ -57,7 +57,7 @@ struct Prepared {
 class CellThread {
  public:
   static constexpr std::size_t kQueueMax = 16;
-  using Done = std::function<void(std::optional<CellFault>)>;
+  using OnActEnd = std::function<void(std::optional<CellFault>)>;
 
   /// `devices` and `description` outlive it.
   CellThread(CellDevices& devices, const CellDescription& description, PostToSocketThread post);
@@ -70,8 +70,8 @@ class CellThread {
   /// confirms.
   bool stop_now() noexcept;
   /// The same from a thread of its own, so that a device which does not answer delays no other request: no pulse is
-  /// begun any more when this returns, and `done` is told whether the laser confirms.
-  void stop(std::function<void(bool is_laser_off)> done);
+  /// begun any more when this returns, and `on_end` gets whether the laser confirms.
+  void stop(std::function<void(bool is_laser_off)> on_end);
   bool is_stop_latched() const { return control_.stop.load(); }
   /// The run ends between two dots. Socket thread, as everything below; callbacks are posted there.
   void pause() { control_.pause.store(true); }
@@ -83,23 +83,23 @@ class CellThread {
   bool is_busy() const { return orders_under_way_ > 0; }
 
   /// Devices connected, their faults cleared, drives on. Nothing moves.
-  void clear(Done done);
+  void clear(OnActEnd on_end);
   /// Axes ready (those that have lost their reference find it now), then the laser's emission armed.
-  void arm(Done done);
+  void arm(OnActEnd on_end);
   /// To the home position: up first, then table, then arm, in the dark.
-  void home(Done done);
+  void home(OnActEnd on_end);
   /// The laser's emission disarmed: at the end of a job.
   void disarm();
   /// Reads the program and the journal (made at a job's first start), checks where they come from, reads the true
   /// joints.
-  void prepare(PaintOrder order, std::function<void(Prepared)> done);
+  void prepare(PaintOrder order, std::function<void(Prepared)> on_end);
   /// Paints what prepare() has read. Progress comes at most ten times a second.
   void paint(std::vector<Joints> approach, std::function<void(std::size_t exposed)> on_progress,
-             std::function<void(ExecutionResult, PaintTally)> done);
+             std::function<void(ExecutionResult, PaintTally)> on_end);
   /// Lets go of what prepare() has read.
   void release();
   /// What the journal of a job that does not run says.
-  void inspect(PaintOrder order, std::function<void(std::optional<PaintTally>)> done);
+  void inspect(PaintOrder order, std::function<void(std::optional<PaintTally>)> on_end);
 
  private:
   struct Loaded {
@@ -120,7 +120,7 @@ class CellThread {
   void find_references();
   void arm_devices();
   void travel_home();
-  void act(std::function<void()> work, Done done);
+  void act(std::function<void()> work, OnActEnd on_end);
 
   CellDevices& devices_;
   const Cell cell_;
@@ -132,7 +132,7 @@ class CellThread {
   std::mutex mutex_;
   std::condition_variable woken_;
   std::deque<std::function<void()>> tasks_;       ///< guarded by mutex_
-  std::vector<std::function<void(bool)>> stops_;  ///< asked for, not yet carried out; guarded by mutex_
+  std::vector<std::function<void(bool)>> stops_;  ///< ordered, not yet carried out; guarded by mutex_
   bool is_working_ = false;                       ///< the executor's thread; guarded by mutex_
   bool is_ending_ = false;                        ///< guarded by mutex_
   std::thread thread_, stop_thread_;

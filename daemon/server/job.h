@@ -9,7 +9,7 @@
 #include "daemon/execution/duration_histogram.h"
 #include "daemon/execution/motion_times.h"
 
-/// A job as the daemon remembers and tells it. Plain data; the socket thread owns it.
+/// A job as the daemon keeps and reports it. Plain data; the socket thread owns it.
 namespace hilbrush {
 
 using Json = nlohmann::ordered_json;
@@ -34,23 +34,26 @@ struct JobError {
 
 struct Job {
   std::int64_t id = 0;
-  std::string key;                 ///< idempotency key, or empty
-  std::uint32_t uid = 0, gid = 0;  ///< whoever submitted it
+  std::string key;        ///< idempotency key, or empty
+  std::uint32_t uid = 0;  ///< of the submitter
+  std::uint32_t gid = 0;
   JobState state = JobState::kQueued;
   std::filesystem::path model;       ///< as submitted
   std::filesystem::path model_copy;  ///< in the job's folder; empty until copied
   std::string settings;              ///< canonical JSON
-  std::string cell;  ///< what the pipeline is told: the daemon's cell file, or another's name for a dry run
+  std::string cell;  ///< for the pipeline: the daemon's cell file, or the name of another cell for a dry run
   bool dry_run = false;
   std::int64_t rank = 0;  ///< jobs that wait are planned, listed and painted in ascending order
   int copies = 1;         ///< parts to paint, one after another
   int copies_done = 0;
-  bool is_begun = false;                ///< the journal of the present copy exists: it must never be made anew
+  bool is_begun = false;                ///< the journal of the present copy exists: it must never be created again
   std::string created, started, ended;  ///< ISO 8601, UTC; started: first painted; empty: not yet
   std::filesystem::path folder;  ///< job.json, model/, program.ply, dots.ply, report.json, journal, emissions.ply
 
   /// Counts of dots of the present copy; placed = exposed + in doubt + remaining + skipped.
-  std::uint64_t placed = 0, exposed = 0, skipped = 0;
+  std::uint64_t placed = 0;
+  std::uint64_t exposed = 0;
+  std::uint64_t skipped = 0;
   std::vector<std::uint32_t> in_doubt;  ///< dot indices, ascending in the program
   std::string stage;                    ///< what is being done, or empty
   double progress = 0;                  ///< 0..1, of the stage while planning, of the dots while painting
@@ -64,17 +67,19 @@ struct Job {
   /// The wall time that Hilbrush itself adds to each dot, of this daemon's life or the last one known.
   struct OwnTime {
     std::uint64_t dots = 0;
-    double median_s = 0, p99_s = 0;
+    double median_s = 0;
+    double p99_s = 0;
   } own_time;
   DurationHistogram own_times;
   /// What moves were measured to take, as a cell file's `measured`: a JSON object as text, or empty.
   std::string measured;
   MotionTimes motion_times;
 
-  /// Not kept: somebody has seen the part in its place and nothing has happened since that could have moved it.
+  /// Not stored: an operator has confirmed that the part is in its place, and nothing has happened since that could
+  /// have moved it.
   bool is_part_confirmed = false;
   int position = 0;       ///< in the queue, from 1; 0: not in it. Not kept.
-  std::uint64_t seq = 0;  ///< rises with every change that is told; begins anew with the daemon
+  std::uint64_t seq = 0;  ///< rises with every change that is reported; starts at 0 with the daemon
 
   static constexpr std::size_t kWarningsMax = 20;
 
@@ -85,8 +90,8 @@ struct Job {
   }
 };
 
-/// Everything that is kept of a job, as text, and back. Reading is tolerant: what is missing or of a wrong type keeps
-/// its default, and a text that is no job at all is none.
+/// Everything that is kept of a job, as text, and back. Reading is tolerant: missing values and those of a wrong type
+/// keep their defaults; empty if the text is not a job at all.
 std::string job_to_record(const Job& job);
 std::optional<Job> job_from_record(const std::string& text);
 

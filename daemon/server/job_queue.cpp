@@ -176,8 +176,8 @@ Job& JobQueue::move(const std::string& id, int position) {
   if (!is_in_queue(job.state)) forbid(job, "only a job that waits has a place in the queue");
   std::vector<const Job*> order = waiting();
   std::erase(order, &job);
-  const auto place = std::min(order.size(), static_cast<std::size_t>(position - 1));
-  order.insert(order.begin() + static_cast<std::ptrdiff_t>(place), &job);
+  const auto index = std::min(order.size(), static_cast<std::size_t>(position - 1));
+  order.insert(order.begin() + static_cast<std::ptrdiff_t>(index), &job);
   std::int64_t rank = 0;
   std::vector<std::int64_t> ranks;
   for (const Job* waiting : order) ranks.push_back(waiting->rank);

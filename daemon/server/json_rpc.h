@@ -16,7 +16,7 @@ namespace hilbrush {
 
 using Json = nlohmann::ordered_json;
 
-/// A request that can't be answered with a result: becomes the reply's "error".
+/// A request that cannot be answered with a result: becomes the reply's "error".
 struct RpcFault {
   int code = kRpcInternal;
   std::string message;
@@ -25,12 +25,12 @@ struct RpcFault {
 
 struct RpcRequest {
   Json id;                       ///< string, number or null; discarded for a notification
-  bool is_notification = false;  ///< nobody wants a reply
+  bool is_notification = false;  ///< no reply is wanted
   std::string method;
   Json params = Json::object();
 };
 
-/// One element of a message: a request, or the fault that makes it none, with the id if it has one.
+/// One element of a message: a request, or the fault that keeps it from being one, with the id if there is one.
 struct RpcElement {
   std::variant<RpcRequest, RpcFault> content;
   Json id;
@@ -44,7 +44,7 @@ struct RpcMessage {
 inline constexpr std::size_t kRpcBatchMax = 64;
 inline constexpr int kRpcDepthMax = 32;
 
-/// Never throws: whatever is wrong is a fault among the elements.
+/// Never throws: everything that is wrong becomes a fault among the elements.
 RpcMessage parse_rpc(std::string_view line);
 
 std::string rpc_result(const Json& id, Json result);

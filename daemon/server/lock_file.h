@@ -8,8 +8,8 @@ namespace hilbrush {
 /// the lock on it counts.
 class LockFile {
  public:
-  /// `held`: what the lock stands for, in the sentence of the error. @throws std::runtime_error if the file can't be
-  /// opened, or somebody else holds it for half a second.
+  /// `held`: what the lock stands for, in the sentence of the error. @throws std::runtime_error if the file cannot be
+  /// opened, or another process holds it for half a second.
   LockFile(const std::filesystem::path& file, const std::string& held);
   ~LockFile();
   LockFile(const LockFile&) = delete;

@@ -282,7 +282,7 @@ void MethodTable::add_session_method() {
                         const auto peer = caller.identify(given.at("token").get<std::string>());
                         if (!peer) {
                           audit_.record(caller.peer, kSessionOpen, Json::object(), "refused");
-                          throw RpcFault{kRpcNotPermitted, "this token is nobody's", "$.token"};
+                          throw RpcFault{kRpcNotPermitted, "this token belongs to no user", "$.token"};
                         }
                         audit_.record(*peer, kSessionOpen, Json::object(), "ok");
                         reply.result({{"user", peer->user}});

@@ -12,14 +12,14 @@
 #include "daemon/server/json_rpc.h"
 
 /// Every method of the socket in one table: its name, what it does, the schemas of its parameters and result, and its
-/// handler. Requests are dispatched and checked by it, and rpc.discover prints it, so that the three can't differ.
+/// handler. Requests are dispatched and checked by it, and rpc.discover prints it, so that the three cannot differ.
 /// Socket thread only.
 namespace hilbrush {
 
 /// The connection a request came over.
 struct Caller {
   Peer peer;
-  /// The connection becomes whoever the token belongs to; if that is nobody, it is closed after the answer.
+  /// The connection takes the identity of the token's owner; if there is none, it is closed after the answer.
   std::function<std::optional<Peer>(const std::string& token)> identify;
   std::function<void(std::int64_t job)> watch, unwatch;
 };
@@ -32,7 +32,7 @@ struct Method {
   bool is_act = false;  ///< recorded in the audit log
   Json params, result;  ///< JSON schemas
   std::function<void(const Json& params, const Caller& caller, Reply reply)> handler;
-  /// Looking needs the right to look, acts that to operate; but whoever may look may also stop the cell.
+  /// Looking needs the right to look, acts need the right to operate; but a peer that may look may also stop the cell.
   Right right() const;
 };
 

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file that closes itself.
+/// Closes its file.
 class OpenFile {
  public:
   explicit OpenFile(int fd) : fd_(fd) {}
@@ -54,17 +54,18 @@ std::vector<gid_t> groups_of(uid_t uid, gid_t gid) {
 
 /// O_NONBLOCK: opening a pipe must not wait for its writer.
 int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
-  int fd = -1, error = 0;
+  int fd = -1;
+  int error = 0;
   {
     const AsPeer peer(uid, gid);
     fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     error = errno;
   }
-  if (fd < 0) throw InputError(file.string(), std::string("can't be read: ") + std::strerror(error));
+  if (fd < 0) throw InputError(file.string(), std::string("cannot be read: ") + std::strerror(error));
   struct stat status {};
   if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(fd);
-    throw InputError(file.string(), "is no regular file");
+    throw InputError(file.string(), "is not a regular file");
   }
   return fd;
 }
@@ -82,13 +83,13 @@ std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintma
   fs::create_directories(to.parent_path());
   const OpenFile out(::open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
   if (out.get() < 0)
-    throw InputError(source.string(), std::string("the job's copy can't be made: ") + std::strerror(errno));
+    throw InputError(source.string(), std::string("the job's copy cannot be made: ") + std::strerror(errno));
   std::vector<char> block(std::size_t{1} << 18);
   std::uintmax_t copied = 0;
   for (;;) {
     const ssize_t count = ::read(from, block.data(), block.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw InputError(source.string(), std::string("can't be read: ") + std::strerror(errno));
+    if (count < 0) throw InputError(source.string(), std::string("cannot be read: ") + std::strerror(errno));
     if (count == 0) return copied;
     copied += static_cast<std::uintmax_t>(count);
     if (copied > bytes_left)
@@ -144,7 +145,7 @@ ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, 
     return {target / model.filename(), hash.hex_digest()};
   } catch (const fs::filesystem_error& error) {
     fs::remove_all(target, ignored);
-    throw InputError(model.string(), std::string("can't be copied: ") + error.what());
+    throw InputError(model.string(), std::string("cannot be copied: ") + error.what());
   } catch (...) {
     fs::remove_all(target, ignored);
     throw;

@@ -30,7 +30,7 @@ class AsPeer {
   std::vector<gid_t> own_groups_;
 };
 
-/// @throws InputError if it is no readable regular file for that peer; the sentence says which of these.
+/// @throws InputError if that peer cannot read it or it is not a regular file; the sentence says which.
 void check_readable(const std::filesystem::path& file, uid_t uid, gid_t gid);
 
 /// `files` as `hilbrush-pipeline files` listed them, the model among them. Each keeps its place relative to the model's

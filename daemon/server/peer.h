@@ -6,7 +6,8 @@
 namespace hilbrush {
 
 struct Peer {
-  std::uint32_t uid = 0, gid = 0;
+  std::uint32_t uid = 0;
+  std::uint32_t gid = 0;
   std::int32_t pid = 0;      ///< 0 over TCP
   std::string user;          ///< name, or the uid's figures
   std::string address;       ///< over TCP: host:port; else empty

@@ -13,7 +13,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -21,6 +20,7 @@
 #include <system_error>
 
 #include "sampling/base/check.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
@@ -28,12 +28,13 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Steady = std::chrono::steady_clock;
 
-constexpr std::size_t kKeptStderr = 2000;
+constexpr std::size_t kStderrBytesMax = 2000;  // of its end, for the message of a crash
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 constexpr int kPollMs = 100;
 
 struct Pipe {
-  int read_end = -1, write_end = -1;
+  int read_end = -1;
+  int write_end = -1;
 };
 
 Pipe make_pipe() {
@@ -85,12 +86,13 @@ struct Launch {
 }
 
 std::uint64_t resident_bytes(pid_t pid) {
-  // Between fork and exec the child is a copy of the daemon, whose size says nothing of the pipeline's.
+  // Between fork and exec the child is a copy of the daemon, whose size says nothing about the pipeline's.
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/" + std::to_string(pid) + "/exe", error);
   if (error || program == std::filesystem::read_symlink("/proc/self/exe", error)) return 0;
   std::ifstream in("/proc/" + std::to_string(pid) + "/statm");
-  std::uint64_t total = 0, resident = 0;
+  std::uint64_t total = 0;
+  std::uint64_t resident = 0;
   in >> total >> resident;
   return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
@@ -103,25 +105,21 @@ std::string last_line(const std::string& text) {
                      end - (begin == std::string::npos ? 0 : begin + 1) + 1);
 }
 
-std::string figure(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
 }  // namespace
 
 struct PipelineChildren::Child {
   ChildId id = 0;
   ChildOrder order;
   pid_t pid = -1;
-  int out_fd = -1, err_fd = -1;
+  int out_fd = -1;
+  int err_fd = -1;
   std::string line, stderr_text;
-  Steady::time_point last_heard, last_told;
+  Steady::time_point last_heard, last_report;
   std::string stage;
   double fraction = 0;
-  bool has_news = false;
-  bool is_killed = false, is_cancelled = false;
+  bool has_new_progress = false;
+  bool is_killed = false;
+  bool is_cancelled = false;
   ChildOutcome outcome;
   bool has_result = false;
 
@@ -197,7 +195,7 @@ void PipelineChildren::watch() {
     for (const auto& child : children_) {
       read_output(*child);
       check_limits(*child);
-      report_progress(*child, Steady::now() - child->last_told >= kProgressInterval);
+      report_progress(*child, Steady::now() - child->last_report >= kProgressInterval);
     }
     std::erase_if(children_, [this](const auto& child) { return reap(*child); });
   }
@@ -211,7 +209,7 @@ void PipelineChildren::spawn(ChildId id, ChildOrder order) {
   auto child = std::make_unique<Child>();
   child->id = id;
   child->order = std::move(order);
-  child->last_heard = child->last_told = Steady::now();
+  child->last_heard = child->last_report = Steady::now();
   try {
     const Pipe out = make_pipe();
     child->out_fd = out.read_end;
@@ -235,7 +233,7 @@ void PipelineChildren::spawn(ChildId id, ChildOrder order) {
     if (child->pid == 0) become_pipeline(launch);
     for (const int fd : {launch.null_fd, launch.out_fd, launch.err_fd}) ::close(fd);
     if (child->pid < 0) throw std::runtime_error(std::string("no process can be started: ") + std::strerror(errno));
-    ::setpgid(child->pid, child->pid);  // the child does it too: whoever comes first
+    ::setpgid(child->pid, child->pid);  // the child does it too: one of the two is first
     for (const int fd : {child->out_fd, child->err_fd}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
   } catch (const std::exception& error) {
     child->outcome.error = error.what();
@@ -248,7 +246,7 @@ void PipelineChildren::spawn(ChildId id, ChildOrder order) {
 void PipelineChildren::read_output(Child& child) {
   const auto drain = [](int& fd, auto take) {
     char buffer[65536];
-    // A child that never stops talking must not keep the others waiting.
+    // A child that never stops writing must not keep the others waiting.
     for (int round = 0; fd >= 0 && round < 16; ++round) {
       const ssize_t count = ::read(fd, buffer, sizeof buffer);
       if (count > 0) {
@@ -278,7 +276,8 @@ void PipelineChildren::read_output(Child& child) {
   });
   drain(child.err_fd, [&](const char* text, std::size_t length) {
     child.stderr_text.append(text, length);
-    if (child.stderr_text.size() > kKeptStderr) child.stderr_text.erase(0, child.stderr_text.size() - kKeptStderr);
+    if (child.stderr_text.size() > kStderrBytesMax)
+      child.stderr_text.erase(0, child.stderr_text.size() - kStderrBytesMax);
   });
 }
 
@@ -292,7 +291,7 @@ void PipelineChildren::take_line(Child& child, const std::string& line) {
       const bool is_new = stage != child.stage;
       child.stage = stage.substr(0, 50);
       child.fraction = std::clamp(json.value("fraction", 0.), 0., 1.);
-      child.has_news = true;
+      child.has_new_progress = true;
       report_progress(child, is_new);
     } else if (json.contains("warning")) {
       if (child.order.on_warning) child.order.on_warning(json.at("warning").get<std::string>());
@@ -304,14 +303,14 @@ void PipelineChildren::take_line(Child& child, const std::string& line) {
       child.outcome.error = json.at("error").at("message").get<std::string>();
     }
   } catch (const Json::exception&) {
-    kill_child(child, "the pipeline wrote a line that is none of its protocol and was killed");
+    kill_child(child, "the pipeline wrote a line that does not belong to its protocol and was killed");
   }
 }
 
 void PipelineChildren::report_progress(Child& child, bool is_due) {
-  if (!is_due || !child.has_news) return;
-  child.has_news = false;
-  child.last_told = Steady::now();
+  if (!is_due || !child.has_new_progress) return;
+  child.has_new_progress = false;
+  child.last_report = Steady::now();
   if (child.order.on_progress) child.order.on_progress(child.stage, child.fraction);
 }
 
@@ -319,9 +318,9 @@ void PipelineChildren::check_limits(Child& child) {
   if (child.is_killed) return;
   const std::chrono::duration<double> silence = Steady::now() - child.last_heard;
   if (silence.count() > limits_.silence_s)
-    kill_child(child, "the pipeline made no progress for " + figure(limits_.silence_s) + " s and was killed");
+    kill_child(child, "the pipeline made no progress for " + number(limits_.silence_s, 3) + " s and was killed");
   else if (resident_bytes(child.pid) > limits_.resident_bytes)
-    kill_child(child, "the pipeline needed more than " + figure(static_cast<double>(limits_.resident_bytes >> 20)) +
+    kill_child(child, "the pipeline needed more than " + number(static_cast<double>(limits_.resident_bytes >> 20), 3) +
                           " MB of memory and was killed; a smaller model or fewer dots may help");
 }
 
@@ -333,12 +332,12 @@ void PipelineChildren::kill_child(Child& child, std::string sentence) {
   ::kill(-child.pid, SIGKILL);
 }
 
-/// True once the child is gone and its end is told.
+/// @return true once the child is gone and its end is reported.
 bool PipelineChildren::reap(Child& child) {
   siginfo_t info{};
   if (::waitid(P_PID, static_cast<id_t>(child.pid), &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
     return false;
-  ::kill(-child.pid, SIGKILL);  // whatever it started itself; before its id can belong to another
+  ::kill(-child.pid, SIGKILL);  // its own children too; before its id can belong to another process
   int status = 0;
   ::waitpid(child.pid, &status, 0);
   read_output(child);
@@ -350,11 +349,11 @@ bool PipelineChildren::reap(Child& child) {
     const bool is_clean = WIFEXITED(status) && WEXITSTATUS(status) == 0;
     outcome.is_ok = is_clean && child.has_result;
     const std::string said = last_line(child.stderr_text);
-    const std::string tail = said.empty() ? "" : "; its last words: " + said;
+    const std::string tail = said.empty() ? "" : "; its last message: " + said;
     if (WIFSIGNALED(status))
       outcome.error = std::string("the pipeline crashed: ") + ::strsignal(WTERMSIG(status)) + tail;
     else if (WEXITSTATUS(status) == 127 && said.empty() && outcome.error.empty())
-      outcome.error = program_.string() + " can't be started";
+      outcome.error = program_.string() + " cannot be started";
     else if (!outcome.is_ok && outcome.error.empty())
       outcome.error =
           "the pipeline ended with exit code " + std::to_string(WEXITSTATUS(status)) + " and without a result" + tail;

@@ -15,19 +15,19 @@
 #include <vector>
 
 /// Runs hilbrush-pipeline as a child process, because models are untrusted bytes and meshes are large: a child that
-/// crashes, hangs or eats memory costs its job and nothing else. The child talks JSON lines on its standard output:
+/// crashes, hangs or eats memory costs its job and nothing else. The child writes JSON lines on its standard output:
 ///   {"stage":"plan","fraction":0.4}   {"warning":".."}   and last   {"result":{..}}   or
 ///   {"error":{"at":"..","message":".."}}
 namespace hilbrush {
 
 /// What a child may use.
 struct ChildLimits {
-  double silence_s = 60;                          ///< no line for so long: it hangs
+  double silence_s = 60;                          ///< a child without a line for this long hangs
   std::uint64_t resident_bytes = 8ull << 30;      ///< watched, because address-space limits fight Embree and TBB
   std::size_t line_bytes = std::size_t{4} << 20;  ///< of its output
 };
 
-/// Who the child runs as; only root can choose.
+/// The user the child runs as; only root can choose.
 struct ChildOwner {
   uid_t uid = 0;
   gid_t gid = 0;
@@ -49,7 +49,7 @@ struct ChildOrder {
   std::function<void(ChildOutcome)> on_end;  ///< exactly once, unless cancelled
 };
 
-/// One thread that starts, watches and buries all children. Its queue holds at most kQueueMax orders and errands.
+/// One thread that starts, watches and reaps all children. Its queue holds at most kQueueMax orders and tasks.
 /// Methods: any thread.
 class PipelineChildren {
  public:
@@ -57,7 +57,7 @@ class PipelineChildren {
   static constexpr std::size_t kQueueMax = 64;
 
   PipelineChildren(std::filesystem::path program, ChildLimits limits);
-  /// Kills what still runs; nothing is called any more.
+  /// Kills the children that still run; no callback is called any more.
   ~PipelineChildren();
   PipelineChildren(const PipelineChildren&) = delete;
   PipelineChildren& operator=(const PipelineChildren&) = delete;

@@ -56,13 +56,13 @@ struct Batch {
 /// One connection. Lives as long as an operation of its socket does.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  using Goodbye = std::function<void(const std::shared_ptr<Session>&)>;
+  using OnClosed = std::function<void(const std::shared_ptr<Session>&)>;
 
-  Session(Stream::socket socket, Peer peer, const ServerLimits& limits, const Services& services, Goodbye goodbye)
+  Session(Stream::socket socket, Peer peer, const ServerLimits& limits, const Services& services, OnClosed on_closed)
       : socket_(std::move(socket)),
         limits_(limits),
         services_(services),
-        on_closed_(std::move(goodbye)),
+        on_closed_(std::move(on_closed)),
         peer_(std::move(peer)),
         identify_timer_(socket_.get_executor()) {}
 
@@ -82,23 +82,27 @@ class Session : public std::enable_shared_from_this<Session> {
   std::size_t unread_bytes() const { return outbox_.size() + writing_.size(); }
   void send(const std::string& line);
   void write();
-  void tell_news();
+  void send_updates();
   void close_if_done();
 
   Stream::socket socket_;
   const ServerLimits limits_;
   const Services services_;
-  const Goodbye on_closed_;
+  const OnClosed on_closed_;
   Peer peer_;
-  asio::steady_timer identify_timer_;  ///< with a connection that has not said who it is
+  asio::steady_timer identify_timer_;  ///< runs while the connection has not identified itself
   std::array<char, 65536> chunk_{};
   std::string inbox_;             ///< bytes not yet served: at most a line and a chunk
   std::size_t searched_ = 0;      ///< of inbox_: holds no end of line before
   std::string outbox_, writing_;  ///< not yet handed to the system, being handed
   std::size_t pending_replies_ = 0;
-  std::set<std::int64_t> watched_, pending_updates_;  ///< jobs; those of them that changed since they were last told
-  bool is_reading_ = false, is_writing_ = false, is_at_end_ = false, is_closed_ = false, is_serving_ = false,
-       is_refused_ = false;
+  std::set<std::int64_t> watched_, pending_updates_;  ///< jobs; those that changed since their last update
+  bool is_reading_ = false;
+  bool is_writing_ = false;
+  bool is_serving_ = false;
+  bool is_at_end_ = false;   ///< nothing more is read
+  bool is_refused_ = false;  ///< by a wrong token
+  bool is_closed_ = false;
 };
 
 void Session::begin() {
@@ -144,7 +148,7 @@ void Session::take(std::size_t count) {
   serve_lines();
 }
 
-/// As long as the client reads what it is answered; else the rest waits, and nothing more is read.
+/// As long as the client reads its answers; otherwise the rest waits, and nothing more is read.
 void Session::serve_lines() {
   if (is_serving_ || is_closed_) return;
   is_serving_ = true;
@@ -255,7 +259,7 @@ void Session::write() {
                       if (self->is_closed_) return;
                       if (error) return self->close();
                       self->write();
-                      self->tell_news();
+                      self->send_updates();
                       self->serve_lines();
                     });
 }
@@ -263,12 +267,12 @@ void Session::write() {
 void Session::notify(const Job& job) {
   if (!watched_.contains(job.id)) return;
   pending_updates_.insert(job.id);
-  tell_news();
+  send_updates();
 }
 
-/// News go out when nothing else waits to be read, each with the state as it is then: a slow client gets fewer of them,
-/// never a queue.
-void Session::tell_news() {
+/// Updates are sent when nothing else waits to be read, each with the state at that moment: a slow client gets fewer of
+/// them, never a queue.
+void Session::send_updates() {
   if (is_writing_ || is_closed_ || is_at_end_) return;
   for (const std::int64_t id : std::exchange(pending_updates_, {})) {
     const auto job = services_.queue.jobs().find(id);
@@ -277,7 +281,7 @@ void Session::tell_news() {
   }
 }
 
-/// A client that has closed its side still gets what it asked for.
+/// A client that has closed its side still gets its answers.
 void Session::close_if_done() {
   const bool has_request = inbox_.find('\n') != std::string::npos;
   if (is_at_end_ && !is_closed_ && !has_request && pending_replies_ == 0 && outbox_.empty() && !is_writing_) close();
@@ -304,7 +308,7 @@ struct Server::Implementation {
   std::unordered_set<std::shared_ptr<Session>> sessions;
 
   Peer identify_peer(Local::socket& socket, const Services& services) { return peer_of(socket, services.access); }
-  /// Nobody yet.
+  /// Not identified yet.
   Peer identify_peer(Tcp::socket& socket, const Services&) {
     boost::system::error_code error;
     const auto remote = socket.remote_endpoint(error);
@@ -318,7 +322,7 @@ struct Server::Implementation {
   void accept(Acceptor& from, const Services& services) {
     from.async_accept([this, &from, services](const boost::system::error_code& error, auto socket) {
       if (error == asio::error::operation_aborted) return;
-      if (error) {  // out of descriptors, most likely: others will close theirs
+      if (error) {  // out of descriptors, most likely: other sessions will close theirs
         const auto retry = std::make_shared<asio::steady_timer>(context, std::chrono::milliseconds(100));
         retry->async_wait([this, &from, services, retry](const boost::system::error_code& aborted) {
           if (!aborted) accept(from, services);
@@ -360,7 +364,7 @@ struct Server::Implementation {
 Server::Server(const ServerLimits& limits) : implementation_(std::make_unique<Implementation>(limits)) {}
 
 Server::~Server() {
-  // Sessions say goodbye as they close; the set must not change under the loop.
+  // Sessions erase themselves as they close; the set must not change under the loop.
   const auto sessions = std::exchange(implementation_->sessions, {});
   for (const auto& session : sessions) session->close();
   if (!implementation_->socket_file.empty()) ::unlink(implementation_->socket_file.c_str());
@@ -375,24 +379,24 @@ void Server::listen(const std::filesystem::path& socket, const Services& service
   if (socket.string().size() >= sizeof(sockaddr_un::sun_path)) fail("is too long for a socket's path");
   struct stat status {};
   if (::lstat(socket.c_str(), &status) == 0) {
-    if (!S_ISSOCK(status.st_mode)) fail("exists and is no socket");
+    if (!S_ISSOCK(status.st_mode)) fail("exists and is not a socket");
     if (::unlink(socket.c_str()) != 0)
-      fail(std::string("what an earlier daemon left can't be removed: ") + std::strerror(errno));
+      fail(std::string("the socket of an earlier daemon cannot be removed: ") + std::strerror(errno));
   }
   auto& acceptor = implementation_->acceptor;
   boost::system::error_code error;
   acceptor.open(Local(), error);
   if (error) fail("no socket can be made: " + error.message());
-  // Nobody may connect before the mode is as it shall be, whatever the umask: bound for nobody, opened to the group,
-  // then listened on.
+  // No client may connect before the mode is right, whatever the umask: the socket is bound without permissions, then
+  // opened to the group, then listened on.
   const mode_t before = ::umask(0777);
   acceptor.bind(Local::endpoint(socket.string()), error);
   ::umask(before);
-  if (error) fail("can't be bound: " + error.message());
+  if (error) fail("cannot be bound: " + error.message());
   implementation_->socket_file = socket;
-  if (::chmod(socket.c_str(), 0660) != 0) fail(std::string("its mode can't be set: ") + std::strerror(errno));
+  if (::chmod(socket.c_str(), 0660) != 0) fail(std::string("its mode cannot be set: ") + std::strerror(errno));
   acceptor.listen(asio::socket_base::max_listen_connections, error);
-  if (error) fail("can't be listened on: " + error.message());
+  if (error) fail("cannot be listened on: " + error.message());
   implementation_->accept(acceptor, services);
 }
 
@@ -402,22 +406,22 @@ std::uint16_t Server::listen_tcp(const std::string& host, std::uint16_t port, co
     if (error) throw std::runtime_error(host + ":" + std::to_string(port) + ": " + what + ": " + error.message());
   };
   const auto address = asio::ip::make_address(host, error);
-  check("is no address");
+  check("is not an address");
   auto& acceptor = implementation_->tcp_acceptor;
   const Tcp::endpoint endpoint(address, port);
   acceptor.open(endpoint.protocol(), error);
   check("no socket can be made");
   acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
   acceptor.bind(endpoint, error);
-  check("can't be bound");
+  check("cannot be bound");
   acceptor.listen(asio::socket_base::max_listen_connections, error);
-  check("can't be listened on");
+  check("cannot be listened on");
   implementation_->accept(acceptor, services);
   return acceptor.local_endpoint().port();
 }
 
 void Server::notify(const Job& job) {
-  // A session may close itself while it is told.
+  // A session may close itself meanwhile.
   const auto sessions = implementation_->sessions;
   for (const auto& session : sessions) session->notify(job);
 }

@@ -9,8 +9,9 @@
 #include "daemon/server/method_table.h"
 
 /// The Unix socket, and a TCP one if it is wanted: JSON-RPC 2.0, one message a line. One thread; requests never wait
-/// behind work. Nobody disturbs anybody: a line is bounded, a client that does not read is not read from either, and
-/// its notifications are held as "there is news" instead of as text.
+/// behind work. Clients do not
+/// disturb each other: a line is bounded; a client that does not read is not read from either, and its notifications
+/// are kept as the numbers of changed jobs, not as text.
 namespace hilbrush {
 
 struct ServerLimits {
@@ -18,7 +19,7 @@ struct ServerLimits {
   std::size_t unread_bytes = std::size_t{1} << 18;  ///< of answers a client has not read, before its requests wait
   std::size_t pending_replies = 64;                 ///< of one client
   std::size_t clients = 1000;
-  double identify_s = 10;  ///< a TCP connection that has not said who it is by then is closed
+  double identify_s = 10;  ///< a TCP connection that has not identified itself by then is closed
 };
 
 /// What the requests of a connection are served by; all outlive the server's run.
@@ -37,18 +38,18 @@ class Server {
 
   /// Runs `task` on the socket thread. Any thread; tasks posted after the end of run() are dropped.
   void post(std::function<void()> task);
-  /// Mode 0660. The caller has made sure that no other daemon uses the path; what is left of a dead one is removed.
+  /// Mode 0660. The caller has made sure that no other daemon uses the path; the socket of a dead one is removed.
   /// @throws std::runtime_error with a sentence.
   void listen(const std::filesystem::path& socket, const Services& services);
   /// On an address of this machine; port 0 takes any free one. @return the port. @throws std::runtime_error
   std::uint16_t listen_tcp(const std::string& host, std::uint16_t port, const Services& services);
-  /// A job has changed: whoever watches it is told. Socket thread.
+  /// A job has changed: clients that watch it are notified. Socket thread.
   void notify(const Job& job);
   std::size_t client_count() const;
 
   /// Calls `task` once on SIGTERM or SIGINT, on the socket thread.
   void on_termination(std::function<void()> task);
-  /// Calls `task` on the socket thread again and again until it says true.
+  /// Calls `task` on the socket thread every `period_s` until it returns true.
   void poll(double period_s, std::function<bool()> task);
   /// Calls `task` on the socket thread every `period_s`, until the end.
   void every(double period_s, std::function<void()> task);

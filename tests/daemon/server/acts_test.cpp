@@ -8,7 +8,7 @@
 #include "tests/daemon/execution/sim_devices.h"
 #include "tests/daemon/server/daemon_fixture.h"
 
-/// Acts that take long, stops that overtake them, and devices that answer late: nobody else waits.
+/// Acts that take long, stops that overtake them, and devices that answer late: no other client waits.
 namespace hilbrush {
 namespace {
 
@@ -16,7 +16,7 @@ using test::DaemonWorld;
 using test::Json;
 using test::LineClient;
 
-/// Closed by the test, opened by it; whoever passes waits while it is closed.
+/// The test closes and opens it; a thread that passes waits while it is closed.
 class Barrier {
  public:
   void close() {
@@ -35,8 +35,8 @@ class Barrier {
     changed_.wait_for(lock, LineClient::kPatience, [this] { return !is_closed_; });
     --waiting_;
   }
-  /// Until somebody stands before it.
-  bool wait_for_somebody() {
+  /// Until a thread waits before it.
+  bool wait_for_arrival() {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, LineClient::kPatience, [this] { return waiting_ > 0; });
   }
@@ -145,7 +145,7 @@ class ServerActsTest : public ::testing::Test {
 TEST_F(ServerActsTest, AClearThatConnectsForLongKeepsNobodyWaiting) {
   connecting.close();
   a->send_bytes(request("cell.clear"));
-  ASSERT_TRUE(connecting.wait_for_somebody());
+  ASSERT_TRUE(connecting.wait_for_arrival());
   EXPECT_EQ(b->result("cell.status").at("cell").at("state"), "clearing");
   EXPECT_EQ(b->error_code("cell.arm"), kRpcWrongState);
   EXPECT_EQ(b->result("cell.stop").at("cell").at("state"), "stopped") << "while the robot is still being connected";
@@ -160,7 +160,7 @@ TEST_F(ServerActsTest, ALaserThatAnswersLateDelaysTheAnswerToItsStopAndNoOther) 
   world.clear_and_arm(*a);
   answering.close();
   a->send_bytes(request("cell.stop"));
-  ASSERT_TRUE(answering.wait_for_somebody());
+  ASSERT_TRUE(answering.wait_for_arrival());
   const Json cell = b->result("cell.status").at("cell");
   EXPECT_EQ(cell.at("state"), "stopped") << "already";
   EXPECT_EQ(cell.at("laser"), "unconfirmed");

@@ -56,7 +56,7 @@ case $verb in
       fat*) exec awk 'BEGIN { s = "a"; while (length(s) < 4e8) s = s s; while (1) ; }' ;;
       bad*) echo '{"error":{"at":"bad.wrl:12","message":"a face has no corners"}}'; exit 3 ;;
       mute*) echo 'out of luck' >&2; exit 1 ;;
-      garbage*) echo 'this is no JSON'; sleep 600 ;;
+      garbage*) echo 'this is not JSON'; sleep 600 ;;
       endless*) head -c 10000000 /dev/zero | tr '\0' 'a'; sleep 600 ;;
     esac
     echo '{"warning":"a texture is missing"}'
@@ -69,7 +69,7 @@ esac
 void write_file(const fs::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary);
   out << text;
-  if (!out.flush()) throw std::runtime_error(file.string() + " can't be written");
+  if (!out.flush()) throw std::runtime_error(file.string() + " cannot be written");
 }
 
 std::string settings_hash() {

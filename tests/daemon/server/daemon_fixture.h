@@ -10,8 +10,8 @@
 #include "daemon/server/daemon.h"
 #include "tests/daemon/execution/program_fixture.h"
 
-/// A daemon in this process on a socket of its own, clients that talk to it as anybody would, and a shell script in the
-/// pipeline's place, which answers by the model's name.
+/// A daemon in this process on a socket of its own, clients that talk to it as any other would, and a shell script in
+/// the pipeline's place, which answers by the model's name.
 namespace hilbrush::test {
 
 using Json = nlohmann::ordered_json;
@@ -51,7 +51,7 @@ class LineClient {
   int error_code(const std::string& method, const Json& params = Json::object());
   /// The next job.update.
   Json next_update();
-  /// Says that nothing more will be sent.
+  /// Shuts the sending side down.
   void end_sending();
 
  private:
@@ -62,7 +62,7 @@ class LineClient {
   std::vector<Json> updates_;
 };
 
-/// State, socket and pipeline of a daemon; the daemon itself can be ended and begun again.
+/// State, socket and pipeline of a daemon; the daemon itself can be ended and started again.
 class DaemonWorld {
  public:
   DaemonWorld();

@@ -127,7 +127,7 @@ TEST(ServerFuzzTest, EveryRequestGetsOneAnswerWhateverItAsks) {
     bool is_closed = false;
     for (;;) {
       const auto line = client->read_line();
-      if (!line) {  // a token that is nobody's
+      if (!line) {  // a token that belongs to no user
         is_closed = true;
         break;
       }
@@ -141,7 +141,7 @@ TEST(ServerFuzzTest, EveryRequestGetsOneAnswerWhateverItAsks) {
       ASSERT_EQ(answer.at("id"), id) << text;
       ASSERT_NE(answer.contains("result"), answer.contains("error")) << *line;
       is_closed = request.at("method") == "session.open" && answer.contains("error") &&
-                  answer["error"]["code"] == kRpcNotPermitted;  // nobody's token
+                  answer["error"]["code"] == kRpcNotPermitted;  // no user's token
       break;
     }
     if (is_closed) {
@@ -174,7 +174,7 @@ TEST(ServerFuzzTest, TheCorpusIsAnsweredAndTheDaemonGoesOn) {
   EXPECT_GT(files, 5u);
   LineClient client = world.client();
   const auto laser = [&] { return client.result("cell.status").at("cell").at("laser").get<std::string>(); };
-  // A stop to whose answer nobody listened may still be on its way to the laser.
+  // A stop whose client is gone may still be on its way to the laser.
   while (laser() == "unconfirmed") std::this_thread::yield();
   EXPECT_EQ(laser(), "off");
 }

@@ -116,7 +116,7 @@ TEST(ServerJobsTest, StopsPausesAndResumesUntilEveryDotIsPaintedOnce) {
   }
   operator_a.result("job.pause", named(id));
   world.wait_for(operator_a, id, "paused");
-  EXPECT_EQ(operator_a.result("cell.status").at("cell").at("state"), "armed") << "a pause is no stop";
+  EXPECT_EQ(operator_a.result("cell.status").at("cell").at("state"), "armed") << "a pause is not a stop";
   operator_a.result("job.resume", named(id));
   const Json job = world.wait_for(operator_a, id, "done");
   const auto counts = emission_counts(world.job_folder(id));
@@ -229,7 +229,7 @@ TEST(ServerJobsTest, PipelinesInTroubleFailTheirJobsWithASentenceAndDisturbNoPai
   const std::vector<std::pair<const char*, const char*>> troubles{
       {"hang.wrl", "no progress"}, {"crash.wrl", "crashed"},
       {"fat.wrl", "memory"},       {"bad.wrl", "a face has no corners"},
-      {"mute.wrl", "out of luck"}, {"garbage.wrl", "none of its protocol"},
+      {"mute.wrl", "out of luck"}, {"garbage.wrl", "does not belong to its protocol"},
       {"endless.wrl", "a line"},   {"outside.wrl", "outside the model's folder"}};
   for (const auto& [name, sentence] : troubles) {
     const auto id = world.submit(client, world.model(name), "failed", name == std::string("mute.wrl"));
@@ -256,7 +256,7 @@ TEST(ServerJobsTest, APipelineThatIsNotThereFailsTheJob) {
                 .at("error")
                 .at("message")
                 .get<std::string>()
-                .find("can't be started"),
+                .find("cannot be started"),
             std::string::npos);
 }
 

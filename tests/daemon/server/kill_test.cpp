@@ -158,7 +158,7 @@ TEST(ServerKillTest, AFullDiskStopsTheJobAndNothingElse) {
   EXPECT_EQ(daemon.end(SIGTERM), 0);
 }
 
-/// What systemd is told: the other end of its notification socket.
+/// In place of systemd: the other end of its notification socket.
 class NotifySocket {
  public:
   explicit NotifySocket(const std::filesystem::path& path) : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {

@@ -37,7 +37,7 @@ class World {
       std::cerr << "the daemon is gone: " << std::strerror(errno) << "\n";
       std::abort();
     }
-    // What is answered is small beside the socket's buffer, so that sending all first blocks nobody.
+    // The answers are small beside the socket's buffer, so sending everything first does not block.
     for (std::size_t sent = 0; sent < count;) {
       const ssize_t now = ::send(fd, bytes + sent, count - sent, MSG_NOSIGNAL);
       if (now <= 0) break;

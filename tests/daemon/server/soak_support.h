@@ -45,7 +45,8 @@ inline double held_mb() {
 #else
   ::malloc_trim(0);
   std::ifstream in("/proc/self/statm");
-  double size = 0, resident = 0;
+  double size = 0;
+  double resident = 0;
   in >> size >> resident;
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
 #endif
@@ -67,7 +68,7 @@ class Crowd {
     while (!is_ending_) {
       try {
         visit();
-      } catch (const std::exception&) {  // thrown out, or nobody answered: both may be
+      } catch (const std::exception&) {  // disconnected, or without an answer: both may happen
       }
       ++visits_;
     }
@@ -116,10 +117,10 @@ inline std::string job_state(LineClient& client, const std::string& id) {
   return client.result("job.get", {{"id", id}}).at("job").at("state").get<std::string>();
 }
 
-/// Armed and painting, from whatever state the cell is in; `mend` undoes what went wrong.
-inline void set_going(LineClient& client, const std::string& id, const std::function<void()>& mend) {
+/// Armed and painting, from whatever state the cell is in; `repair` undoes what went wrong.
+inline void set_going(LineClient& client, const std::string& id, const std::function<void()>& repair) {
   for (int attempt = 0; attempt < 400; ++attempt) {
-    mend();
+    repair();
     const auto cell = client.result("cell.status").at("cell").at("state").get<std::string>();
     if (cell == "stopped") client.call("cell.clear");
     if (cell == "idle") client.call("cell.arm");
@@ -128,14 +129,18 @@ inline void set_going(LineClient& client, const std::string& id, const std::func
     client.call(job == "ready" ? "job.start" : "job.resume", {{"id", id}, {"part_in_place", true}});
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  throw std::runtime_error("job " + id + " can't be got going: " + client.call("cell.status").dump());
+  throw std::runtime_error("job " + id + " cannot be started: " + client.call("cell.status").dump());
 }
 
 /// From the end of the first quarter to the end of it all.
 struct SoakTrace {
-  std::size_t jobs_before = 0, jobs = 0, visits = 0;
-  std::size_t descriptors_before = 0, descriptors = 0;
-  double mb_before = 0, mb = 0;
+  std::size_t jobs_before = 0;
+  std::size_t jobs = 0;
+  std::size_t visits = 0;
+  std::size_t descriptors_before = 0;
+  std::size_t descriptors = 0;
+  double mb_before = 0;
+  double mb = 0;
 };
 inline std::ostream& operator<<(std::ostream& out, const SoakTrace& trace) {
   return out << trace.visits << " visits; memory " << trace.mb_before << " -> " << trace.mb << " MB over "

@@ -13,7 +13,7 @@
 #include "tests/daemon/server/soak_support.h"
 
 /// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients
-/// that come, talk nonsense and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N so many seconds.
+/// that come, send garbage and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N makes it N seconds.
 namespace hilbrush {
 namespace {
 
@@ -51,7 +51,9 @@ class Soak {
   }
 
   DaemonWorld& world() { return world_; }
-  std::size_t jobs = 0, disturbances = 0, doubts = 0;
+  std::size_t jobs = 0;
+  std::size_t disturbances = 0;
+  std::size_t doubts = 0;
 
  private:
   void set_going(LineClient& client, const std::string& id) {

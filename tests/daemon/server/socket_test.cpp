@@ -84,7 +84,7 @@ TEST(ServerSocketTest, ServesBatchesAndNotifications) {
                     R"({"jsonrpc":"2.0","method":"cell.status"})"
                     "]\n");
   EXPECT_EQ(client.call("system.info").at("result").at("system").at("version"), HILBRUSH_VERSION)
-      << "nobody answered the notifications";
+      << "notifications get no answer";
   std::string large = "[" + kStatus;
   for (int i = 0; i < 200; ++i) large += "," + kStatus;
   client.send_bytes(large + "]\n");
