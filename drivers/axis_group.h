@@ -37,8 +37,7 @@ class AxisGroup {
     std::string fault;         ///< a sentence, if state is kFault
     /// When the first frame or reply came that showed it in position and settled, on the cell's clock; 0 if unknown.
     double in_position_since_s = 0;
-    /// When the frame came, or the reading was begun, that all this is known by, on the cell's clock; 0: it is of the
-    /// present.
+    /// How old this is: when the frame came, or the reading was begun, on the cell's clock; 0: it is of the present.
     double read_s = 0;
   };
 
@@ -55,9 +54,9 @@ class AxisGroup {
   /// How many further targets move_to() takes while a move is under way: they are visited in order, each at rest;
   /// in_position is about the last of them, and stop() forgets them all. One more is refused.
   virtual std::size_t look_ahead() const { return 0; }
-  /// A target that will be asked for next, told while a pulse is on: a device that can may be sent the set-point
-  /// without its trigger. Nothing moves by it. A hint that never waits for the device and is forgotten by a stop, a
-  /// fault and every other target; the next move_to() need not follow it.
+  /// The next target, given while a pulse is on: a device that allows it is sent the set-point without its trigger.
+  /// Nothing moves. It is a hint: it never waits for the device, and a stop, a fault and every other target cancel it.
+  /// The next move_to() need not follow it.
   virtual void prepare(const Positions& /*target*/) {}
   /// What is known by the last frame or reply: cheap, never waits for the device. When the answer changes in state,
   /// fault or in_position, devices that learn it by themselves wake the cell's clock. From any thread.

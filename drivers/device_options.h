@@ -10,17 +10,17 @@
 /// Cell units: rad and m; device units are named.
 namespace hilbrush {
 
-/// One axis as the cell means it and as the device counts it: device = sign * (ours - offset) * steps_per_unit.
+/// One axis as the cell means it and as the device counts it: device = sign * (si - offset) * steps_per_unit.
 struct AxisScale {
   double sign = 1;            ///< 1 or -1
-  double offset = 0;          ///< rad or m, of ours where the device is at 0
+  double offset = 0;          ///< rad or m, where the device is at 0
   double steps_per_unit = 1;  ///< steps per rad or m
 
-  double to_device(double ours) const { return sign * (ours - offset) * steps_per_unit; }
+  double to_device(double si) const { return sign * (si - offset) * steps_per_unit; }
   double to_si(double device) const { return device / (sign * steps_per_unit) + offset; }
 };
 
-/// What an axis may do, whatever it is told.
+/// What an axis may do: orders beyond it are refused.
 struct AxisBounds {
   double min = 0, max = 0;      ///< rad or m
   double speed_max = 0;         ///< rad/s or m/s
@@ -87,7 +87,7 @@ struct RegisterTest {
   std::uint32_t mask = 0, equals = 0;
 };
 
-/// How a positioning drive is spoken to over Modbus, as data: see config/axes/*.json.
+/// How a positioning drive is driven over Modbus, as data: see config/axes/*.json.
 struct RegisterMap {
   std::string name;
   std::vector<MappedRegister> registers;
@@ -111,7 +111,7 @@ struct LaserOptions {
   /// Wall, between two commands that are answered; Cobolt lasers: what the maker's own library keeps.
   double command_gap_s = 0.1;
   double heartbeat_s = 0.02;  ///< to its guard
-  int heartbeats_missed = 5;  ///< so many missing in a row disable it
+  int heartbeats_missed = 5;  ///< this many missing in a row disable it
 };
 
 }  // namespace hilbrush

@@ -27,10 +27,10 @@ class Laser {
   virtual Limits limits() = 0;
   /// Arms emission: key and interlock are checked, the start delay is waited for. No light yet. @throws DriverError
   virtual void enable() = 0;
-  /// Emission can't happen any more until enable(). From any thread, idempotent, never throws.
+  /// Emission cannot happen any more until enable(). From any thread, idempotent, never throws.
   virtual void disable() noexcept = 0;
-  /// What the next pulse needs and what can be set in the dark: told while the axes move. No light comes of it, and
-  /// fire() need not follow it. Executor's thread only. @throws DriverError if the device refuses or is lost
+  /// Sets what the next pulse needs, such as its power, while the axes move and the gate is closed. No light comes of
+  /// it, and fire() need not follow. Executor's thread only. @throws DriverError if the device refuses or is lost
   virtual void prepare(double /*power_w*/, double /*pulse_s*/) {}
   /// Starts one pulse; the device itself ends it after pulse_s, whatever happens to the caller. Executor's thread only.
   /// @throws DriverError if not enabled, outside limits(), interlock open, or still emitting.

@@ -24,9 +24,9 @@ class LaserHead {
 
   virtual ~LaserHead() = default;
   virtual void connect() = 0;                       ///< disconnected -> connected; emission off, and confirmed
-  virtual std::vector<std::string> identify() = 0;  ///< a line each, for people
+  virtual std::vector<std::string> identify() = 0;  ///< a line each, for the operator
   virtual Powers powers() = 0;                      ///< the device's own limits, as read when it was connected
-  /// Key, interlock and faults are looked at, modulation is set, the start delay is waited for. @throws DriverError
+  /// Checks key, interlock and faults, sets the modulation, waits for the start delay. @throws DriverError
   virtual void arm() = 0;
   /// Emission off. From any thread, idempotent, bounded. True if the device confirms it.
   virtual bool disarm() noexcept = 0;
@@ -35,14 +35,14 @@ class LaserHead {
   /// By the last reading: cheap, from any thread.
   virtual Status status() = 0;
   /// Asks for a reading as soon as the link is free, and returns. From any thread.
-  virtual void look() = 0;
+  virtual void request_status() = 0;
   virtual void clear_fault() = 0;
   /// A pulse of another device's gate is about to begin, or is confirmed over: a head that outlives its user turns
-  /// emission off if it hears of no end. The first throws DriverError if nobody would watch; the second is from any
-  /// thread.
+  /// emission off if it hears of no end. begin_pulse() throws DriverError if the guard is lost; end_pulse() may be
+  /// called from any thread.
   virtual void begin_pulse(double /*pulse_s*/) {}
   virtual void end_pulse() noexcept {}
-  /// Called from any thread when status() has changed or a reading came that look() had asked for. Set once.
+  /// Called from any thread when status() has changed or a reading came that request_status() asked for. Set once.
   virtual void set_listener(std::function<void()> on_change) = 0;
 };
 

@@ -22,7 +22,7 @@ class AxisDrive {
     double position = 0;             ///< measured, steps
     std::optional<double> setpoint;  ///< what the profile asks for now, steps
     bool is_enabled = false, is_homed = false;
-    bool has_arrived = false;  ///< the drive's own word
+    bool has_arrived = false;  ///< as the drive reports it
     bool has_fault = false;
     std::uint32_t alarm = 0;
   };
@@ -30,14 +30,14 @@ class AxisDrive {
   virtual ~AxisDrive() = default;
   virtual void connect() = 0;
   virtual void close() noexcept = 0;
-  /// For people. @throws DriverError
+  /// For the operator. @throws DriverError
   virtual std::string identify() = 0;
   virtual Reading read() = 0;
   virtual void enable(const GiveUp& give_up) = 0;
   virtual void disable() = 0;
   virtual void home(const GiveUp& give_up) = 0;
-  /// Writes of a move what starts none: nothing moves, now or later, by this alone. False if this drive has no such
-  /// part. What fails leaves the drive with data that the next whole order overwrites.
+  /// Writes the part of a move that does not start it: nothing moves, now or later, by this alone. False if this drive
+  /// has no such part. What fails leaves the drive with data that the next whole order overwrites.
   virtual bool write_ahead(const Move& move, const GiveUp& give_up) = 0;
   /// Returns when the drive has taken the order. `is_ahead`: write_ahead() has written this very move, and nothing was
   /// ordered since; only the rest of it is sent.

@@ -124,7 +124,7 @@ void DriveGroup<N>::disable() noexcept {
     if (command)
       for (const auto& drive : drives_) drive->disable();
   } catch (const std::exception&) {
-    // A drive that can't be asked is off, or its link is lost, which the polling thread reports.
+    // A drive that cannot be asked is off, or its link is lost, which the polling thread reports.
   }
   const std::lock_guard lock(mutex_);
   if (group_.state != DeviceState::kDisconnected && group_.state != DeviceState::kFault)
@@ -203,7 +203,7 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
       is_new[i] = !group_.is_in_position || moves[i].target != target_[i].target;
       is_ahead[i] = ahead_ && ahead_->is_written[i] && ahead_->moves[i] == moves[i];
     }
-    // An order to stay, which only settles anew, leaves what is ahead for the move that will follow.
+    // An order to stay at the target, which only restarts settling, leaves what was sent ahead for the next move.
     if (std::find(is_new.begin(), is_new.end(), true) != is_new.end()) ahead_.reset();
     group_.arrival_s = clock_.now_s() + travel_s(target) + settle_s;
     target_ = moves;
@@ -246,8 +246,8 @@ void DriveGroup<N>::prepare(const Positions& target) {
   poll_asked_.notify_all();
 }
 
-/// Polling thread. A drive that does not take it is no fault here: the move itself is then sent whole, and meets the
-/// same drive.
+/// Polling thread. It is not a fault if a drive does not take it: the move itself is then sent whole, and
+/// reports what is wrong with the drive.
 template <std::size_t N>
 void DriveGroup<N>::write_ahead() {
   const std::unique_lock command(command_mutex_, deadline_in(0));
@@ -402,7 +402,7 @@ void DriveGroup<N>::poll() {
       const double begun_s = clock_.now_s();
       take(read_all(), begun_s);
     } catch (const DriverError& error) {
-      set_fault("the " + group_.name() + " can't be read: " + error.what());
+      set_fault("the " + group_.name() + " cannot be read: " + error.what());
     }
     lock.lock();
   }

@@ -20,9 +20,9 @@ namespace hilbrush {
 
 /// N drives on fieldbuses as one group. A polling thread reads the drives: as fast as they answer while an axis is
 /// under way, a few times a second at rest. In position: after the order was taken, every drive says so, its set-point
-/// (if it tells one) is the target, and its position is within the window, in every reading for the settle time; a
-/// reading counts only if it was begun after the order had been taken, so that what a drive still says of its last move
-/// doesn't.
+/// (if it reports one) is the target, and its position is within the window, in every reading for the settle time; a
+/// reading counts only if it was begun after the order had been taken, because before that a drive may still report
+/// the end of its last move.
 ///
 /// prepare() leaves the next target to the polling thread, which writes ahead what starts nothing of the axes that will
 /// move; a move_to() of that very target then sends only the rest.
@@ -48,12 +48,12 @@ class DriveGroup final : public AxisGroup<N> {
   double expected_arrival_s() override;
   void stop() noexcept override;
 
-  /// A line for each drive, for people. @throws DriverError
+  /// A line for each drive, for the operator. @throws DriverError
   std::vector<std::string> identify();
 
  private:
   using Readings = std::array<AxisDrive::Reading, N>;
-  /// What prepare() was told, and which drives have it.
+  /// The target given to prepare(), and which drives have it.
   struct Ahead {
     std::array<AxisDrive::Move, N> moves{};
     std::array<bool, N> is_written{};
@@ -90,7 +90,7 @@ class DriveGroup final : public AxisGroup<N> {
   std::array<AxisDrive::Move, N> target_{};  ///< in steps
   std::optional<Ahead> ahead_;               ///< of the next move; only while no axis moves
   double accepted_s_ = 0;
-  double rest_s_ = -1;  ///< since when it rests at the target, on the cell's clock; negative: it doesn't
+  double rest_s_ = -1;  ///< since when it rests at the target, on the cell's clock; negative: it does not
   double read_s_ = 0;
   std::thread thread_;
 };

@@ -32,7 +32,7 @@ void check_descriptors(const std::string& name) {
   const int next = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (next >= 0) ::close(next);
   if (next < 0 || next >= FD_SETSIZE)
-    throw LinkError(name + ": can't be connected: this process has too many files and clients open");
+    throw LinkError(name + ": cannot be connected: this process has too many files and clients open");
 }
 
 std::string words_text(std::span<const std::uint16_t> words) {
@@ -70,7 +70,7 @@ void ModbusBus::connect() {
     const int error = errno;
     modbus_free(context_);
     context_ = nullptr;
-    throw LinkError(name_ + ": can't be connected: " + modbus_strerror(error));
+    throw LinkError(name_ + ": cannot be connected: " + modbus_strerror(error));
   }
   const auto microseconds = static_cast<std::uint32_t>(reply_s_ * 1e6);
   modbus_set_response_timeout(context_, microseconds / 1000000, microseconds % 1000000);

@@ -93,7 +93,7 @@ void OrientalDrive::set_inputs(std::uint16_t inputs) {
   is_stop_held_ = (inputs & kStop) != 0;
 }
 
-/// The drive looks at its inputs every few milliseconds and wants to see one for 20.
+/// The drive samples its inputs every few milliseconds and must see an input for 20 ms.
 void OrientalDrive::pulse_input(std::uint16_t input) {
   set_inputs(input);
   std::this_thread::sleep_for(std::chrono::milliseconds(25));

@@ -30,7 +30,7 @@ struct Reply {
   std::string values;   ///< between the braces
   std::string command;  ///< the echo, as sent
 };
-/// `text` without its semicolon. Nothing if it is no reply.
+/// `text` without its semicolon. Nothing if it is not a reply.
 std::optional<Reply> decode_reply(std::string_view text);
 /// Whether `echo` repeats `command`: same name, without regard to case, and the same number of parameters.
 bool is_echo(std::string_view echo, std::string_view command);
@@ -68,7 +68,7 @@ inline constexpr std::size_t kFrameBytes = 1440;
 /// Nothing unless length, test word and figures are those of a frame.
 std::optional<Frame> decode_frame(std::string_view bytes);
 
-/// Cuts the feedback stream into frames, and finds its place again after bytes were lost.
+/// Cuts the feedback stream into frames, and finds the next frame again after bytes were lost.
 class FrameStream {
  public:
   void push(std::string_view bytes);
@@ -81,7 +81,7 @@ class FrameStream {
   std::uint64_t dropped_bytes_ = 0;
 };
 
-/// Cuts a reply stream at its semicolons. Bounded: throws nothing, and says when a reply has grown too long.
+/// Cuts a reply stream at its semicolons. Never throws; is_overlong() when a reply has grown too long.
 class ReplyStream {
  public:
   static constexpr std::size_t kReplyMax = 8192;

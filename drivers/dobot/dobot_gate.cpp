@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint64_t kFramesOfGrace = 4;  ///< until a frame must show an output that was confirmed off
 constexpr std::uint64_t kOverdueMs = 16;     ///< two frames: how finely a controller may divide its time
-constexpr double kImpatientS = 0.005;        ///< wall
+constexpr double kFirstTryS = 0.005;         ///< wall: for the first try to end a pulse
 
 }  // namespace
 
@@ -26,7 +26,7 @@ void DobotRobot::OutputGate::set_listener(Listener listener) {
   listener_ = std::move(listener);
 }
 
-void DobotRobot::OutputGate::tell(bool is_dark) {
+void DobotRobot::OutputGate::notify(bool is_dark) {
   Listener listener;
   {
     const std::lock_guard lock(robot_.mutex_);
@@ -43,7 +43,7 @@ bool DobotRobot::OutputGate::is_busy() const {
 const char* DobotRobot::OutputGate::fault_in(const dobot::Frame& frame) {
   const bool is_lit = (frame.digital_outputs >> (output_ - 1) & 1) != 0;
   if (!is_lit) return nullptr;
-  if (is_known_off_ && robot_.frame_count_ >= known_frame_ + kFramesOfGrace) return "is on though nobody ordered it";
+  if (is_known_off_ && robot_.frame_count_ >= known_frame_ + kFramesOfGrace) return "is on without an order";
   if (!is_pulsing_) return nullptr;
   if (!lit_ms_) lit_ms_ = frame.time_ms;
   return frame.time_ms > *lit_ms_ + pulse_ms_ + kOverdueMs ? "is on longer than its pulse" : nullptr;
@@ -73,7 +73,7 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
         if (!is_pulsing_) return;
         note_off();
       }
-      tell(true);
+      notify(true);
     });
   } catch (const DriverError&) {
     off();
@@ -81,9 +81,9 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
   }
 }
 
-/// Dark first; then the queue is emptied, and what it may have turned on between the two is turned off again: all in
-/// one write, because an emptied queue has lost the end of its pulse. A controller in alarm refuses to be reset, with
-/// an empty queue.
+/// Turns the output off, empties the queue, and turns the output off again in case the queue turned it on in between.
+/// All in one write, because an emptied queue has lost the end of its pulse. A controller in alarm refuses the reset,
+/// but its queue is empty.
 bool DobotRobot::OutputGate::order_off(bool was_pulsing, double wall_s) noexcept {
   try {
     const std::string off = dobot::encode("DOExecute", {output_, 0});
@@ -95,8 +95,8 @@ bool DobotRobot::OutputGate::order_off(bool was_pulsing, double wall_s) noexcept
   }
 }
 
-/// While a pulse may be on, a controller that doesn't answer at once is not waited for: the listener is told to turn
-/// off whatever else there is to turn off. The second try opens a new connection.
+/// While a pulse may be on, a controller that does not answer at once is not waited for: the listener is called first,
+/// so that the laser head is disarmed. The second try opens a new connection.
 bool DobotRobot::OutputGate::off() noexcept {
   try {
     bool was_pulsing = false;
@@ -107,8 +107,8 @@ bool DobotRobot::OutputGate::off() noexcept {
         return true;
       was_pulsing = is_pulsing_;
     }
-    if (!order_off(was_pulsing, was_pulsing ? kImpatientS : DobotPorts::kUrgentS)) {
-      tell(false);
+    if (!order_off(was_pulsing, was_pulsing ? kFirstTryS : DobotPorts::kUrgentS)) {
+      notify(false);
       if (!order_off(was_pulsing, DobotPorts::kUrgentS)) return false;
     }
     if (was_pulsing) robot_.ports_.forget_owed();
@@ -116,7 +116,7 @@ bool DobotRobot::OutputGate::off() noexcept {
       const std::lock_guard lock(robot_.mutex_);
       note_off();
     }
-    if (was_pulsing) tell(true);
+    if (was_pulsing) notify(true);
     return true;
   } catch (const std::exception&) {
     return false;

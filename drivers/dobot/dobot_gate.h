@@ -20,18 +20,18 @@ class DobotRobot::OutputGate final : public Gate {
   bool is_on() override;
   void set_listener(Listener listener) override;
 
-  /// Reader's thread, under the robot's mutex: what is wrong if the output is on though nobody ordered it, or longer
+  /// Reader's thread, under the robot's mutex: what is wrong if the output is on without an order, or longer
   /// than its pulse; else nothing.
   const char* fault_in(const dobot::Frame& frame);
   bool is_pulsing() const { return is_pulsing_; }  ///< under the robot's mutex
-  /// A pulse is queued or just over, so that the controller may still call itself running. Under the robot's mutex.
+  /// A pulse is queued or just over, so that the controller may still report "running". Under the robot's mutex.
   bool is_busy() const;
   /// The robot was disconnected or lost: nothing is known. Under the robot's mutex.
   void forget() { is_known_off_ = false; }
 
  private:
   void note_off();
-  void tell(bool is_dark);
+  void notify(bool is_dark);
   bool order_off(bool was_pulsing, double wall_s) noexcept;
 
   DobotRobot& robot_;

@@ -121,13 +121,13 @@ void DobotPorts::motion(const std::string* commands, std::size_t count, std::siz
   {
     const std::lock_guard lock(mutex_);
     if (is_lost_) throw LinkError(lost_sentence_);
-    if (owed_.size() + count > kOwedMax) throw DriverError("the robot owes too many answers");
+    if (owed_.size() + count > kOwedMax) throw DriverError("the robot has left too many commands unanswered");
     for (std::size_t i = 0; i < count; ++i) {
       owed_.push_back({commands[i], i + 1 == count ? on_later : OnReply{}});
       if (i < count - later_count)
         owed_.back().on_reply = [this, command = commands[i]](const dobot::Reply* reply) {
           const std::lock_guard reply_lock(mutex_);
-          if (waited_for_ == 0) return;  // nobody waits any more
+          if (waited_for_ == 0) return;  // motion() no longer waits
           --waited_for_;
           if (reply == nullptr)
             refusal_ = "the robot: " + command + " was overtaken by a stop";
@@ -148,7 +148,7 @@ void DobotPorts::motion(const std::string* commands, std::size_t count, std::siz
     waited_for_ = 0;
     const std::string sentence = "the robot does not answer " + bytes + motion_->messages().text();
     lock.unlock();
-    fail(sentence);  // whatever it answers later would be taken for the answer to something else
+    fail(sentence);  // a later answer would be taken for that to another command
     throw LinkError(sentence);
   }
   if (!refusal_.empty()) throw DriverError(refusal_ + motion_->messages().text());
@@ -168,7 +168,7 @@ void DobotPorts::forget_owed() {
   answered_.notify_all();
 }
 
-/// Reader's thread, or the one that gave up waiting. Says it once.
+/// Reader's thread, or the one that gave up waiting. Reports it once.
 void DobotPorts::fail(const std::string& sentence) {
   {
     const std::lock_guard lock(mutex_);
@@ -187,7 +187,7 @@ void DobotPorts::run() {
                                    pollfd{feedback_->descriptor(), POLLIN, 0}};
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(feedback_deadline_ - Steady::now()).count();
       const int ready = ::poll(polled.data(), polled.size(), static_cast<int>(std::max<long long>(left, 0)));
-      if (ready < 0 && errno != EINTR) throw LinkError("the robot's ports can't be polled");
+      if (ready < 0 && errno != EINTR) throw LinkError("the robot's ports cannot be polled");
       if (polled[0].revents != 0) return;
       // All frames that came before an answer are older than it: a reader that was kept waiting must not take one of
       // them for what followed.
@@ -236,7 +236,7 @@ void DobotPorts::settle_reply(const std::string& text) {
     while (!owed_.empty() && owed_.front().is_forgotten && !dobot::is_echo(reply->command, owed_.front().command))
       owed_.pop_front();
     if (owed_.empty() || !dobot::is_echo(reply->command, owed_.front().command))
-      throw LinkError("the robot answers what it was not asked" + motion_->messages().text());
+      throw LinkError("the robot sent an answer to no command" + motion_->messages().text());
     callback = std::move(owed_.front().on_reply);
     owed_.pop_front();
   }

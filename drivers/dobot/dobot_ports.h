@@ -17,9 +17,9 @@
 
 namespace hilbrush {
 
-/// The three connections of one Dobot controller. The dashboard is asked and answers; motion commands are queued, each
-/// is answered when taken (Sync when all before it is done); the feedback port sends a frame every 8 ms. One reader
-/// thread takes whatever motion and feedback ports say.
+/// The three connections of one Dobot controller. The dashboard answers each command at once; motion commands are
+/// queued, each is answered when accepted (Sync when all before it is done); the feedback port sends a frame every 8
+/// ms. One reader thread takes whatever motion and feedback ports say.
 class DobotPorts {
  public:
   static constexpr double kReplyS = 1;     ///< wall: an ordinary answer
@@ -40,8 +40,8 @@ class DobotPorts {
   void close() noexcept;
 
   /// One command on the dashboard; returns the reply's values. From any thread, one exchange at a time; connects if
-  /// need be. A reply that doesn't come in time or doesn't belong to the command closes the connection, so that a late
-  /// one can't be taken for another's. @throws LinkError; DriverError if the controller refuses.
+  /// need be. A reply that does not come in time or does not belong to the command closes the connection, so that a
+  /// late one cannot be taken for another's. @throws LinkError; DriverError if the controller refuses.
   std::string dashboard(const std::string& command, double wall_s = kReplyS);
 
   /// Several commands in one write, so that nothing comes between them; their replies in the same order, refusals

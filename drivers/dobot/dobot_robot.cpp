@@ -12,7 +12,7 @@ namespace hilbrush {
 namespace {
 
 constexpr double kFrameS = 0.008;
-constexpr double kSilentFrames = 30;      ///< so many missing in a row: the feedback has stopped
+constexpr double kSilentFrames = 30;      ///< this many missing in a row: the feedback has stopped
 constexpr double kSilenceMinS = 0.25;     ///< wall: a busy machine may keep the reader waiting
 constexpr double kEnableS = 20;           ///< cell
 constexpr double kSetpointWindow = 2e-5;  ///< deg, mm: what six decimals and the controller's arithmetic may differ
@@ -50,7 +50,7 @@ DobotRobot::~DobotRobot() {
   ports_.close();
 }
 
-DobotRobot::Positions DobotRobot::ours(const dobot::Joints& joints) const {
+DobotRobot::Positions DobotRobot::to_si(const dobot::Joints& joints) const {
   Positions positions;
   for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = options_.scales[i].to_si(joints[i]);
   return positions;
@@ -68,13 +68,13 @@ void DobotRobot::fail(const std::string& sentence) {
     const std::lock_guard lock(mutex_);
     if (!set_fault(sentence)) return;
   }
-  shut_gates();
+  close_gates();
   clock_.wake();
 }
 
-/// After a fault nobody knows whether the controller still carries out what was queued, such as the end of a pulse: the
-/// dashboard may answer all the same.
-void DobotRobot::shut_gates() noexcept {
+/// After a fault it is not known whether the controller still carries out what was queued, such as the end of a pulse.
+/// The dashboard may still answer.
+void DobotRobot::close_gates() noexcept {
   std::vector<OutputGate*> gates;
   {
     const std::lock_guard lock(mutex_);
@@ -139,7 +139,7 @@ void DobotRobot::enable() {
   group_.require(DeviceState::kConnected, "enabled");
   ports_.dashboard(dobot::encode("EnableRobot"), DobotPorts::kReplyS * 5);
   wait_for_mode(dobot::Mode::kEnabled, kEnableS, "enabled");
-  ports_.dashboard(dobot::encode("ResetRobot"));  // a queue that another program left behind must not start to move
+  ports_.dashboard(dobot::encode("ResetRobot"));  // a queue left behind by another program must not start to move
   ports_.dashboard(dobot::encode("SpeedFactor", {options_.speed_percent}));
   ports_.dashboard(dobot::encode("User", {0}));
   ports_.dashboard(dobot::encode("Tool", {0}));
@@ -170,8 +170,8 @@ void DobotRobot::disable() noexcept {
   if (group_.state != DeviceState::kFault) group_.state = DeviceState::kConnected;
 }
 
-/// Emptying the queue drops the end of a pulse with the rest.
-void DobotRobot::shut_pulses() noexcept {
+/// Closes gates whose pulse is not over: emptying the queue drops the end of the pulse as well.
+void DobotRobot::end_pulses() noexcept {
   std::vector<OutputGate*> gates;
   {
     const std::lock_guard lock(mutex_);
@@ -191,7 +191,7 @@ void DobotRobot::wait_for_alarm_end() {
   }
 }
 
-/// Everything is connected anew: after a fault it is not known what the ports still owe.
+/// Connects all ports again: after a fault it is not known which answers are still to come.
 void DobotRobot::clear_fault() {
   group_.require(DeviceState::kFault, "cleared of a fault");
   ports_.close();
@@ -256,10 +256,10 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
   group_.is_in_position = false;
 }
 
-/// The controller's own account: its profile has ended at the target, nothing turns, nothing is queued.
+/// By what the controller reports: its profile has ended at the target, no axis moves, nothing is queued.
 bool DobotRobot::is_at_rest(const dobot::Frame& frame) const {
-  // While the queue times a pulse the controller calls itself running; that is no motion where the arm stood already.
-  // Before, running is believed: a frame may show the very begin of a move, at no speed yet, and the next one its end.
+  // While the queue times a pulse the controller reports "running" although the arm, already in position, does not
+  // move. Before that, "running" counts as motion: a frame may show the very beginning of a move, still at speed 0.
   const bool is_pulsing_in_place =
       group_.is_in_position &&
       std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) { return gate.second->is_busy(); });
@@ -289,7 +289,7 @@ bool DobotRobot::judge_arrival(const dobot::Frame& frame) {
   const bool is_near = is_within_window(frame);
   // Stamps are cut to whole milliseconds: one is added, so that the settle time is never cut short.
   if (rest_ms_ < 0) rest_ms_ = time_ms + kStampMs;
-  if (was_in_position && !is_near) rest_ms_ = time_ms + kStampMs;  // it left its place: settling begins anew
+  if (was_in_position && !is_near) rest_ms_ = time_ms + kStampMs;  // it left its place: settling starts again
   group_.is_in_position = is_near && (group_.settle_s <= 0 || time_ms >= rest_ms_ + group_.settle_s * 1e3);
   if (group_.is_in_position && !was_in_position) group_.in_position_since_s = clock_.now_s();
   return group_.is_in_position != was_in_position;
@@ -320,13 +320,13 @@ void DobotRobot::take_frame(const dobot::Frame& frame) {
       }
     has_failed = has_failed || (is_news && group_.state == DeviceState::kFault);
   }
-  if (has_failed) shut_gates();
+  if (has_failed) close_gates();
   if (is_news) clock_.wake();
 }
 
 DobotRobot::Status DobotRobot::status() {
   const std::lock_guard lock(mutex_);
-  return group_.status(ours(frame_.actual), frame_s_);
+  return group_.status(to_si(frame_.actual), frame_s_);
 }
 
 double DobotRobot::expected_arrival_s() {
@@ -341,7 +341,7 @@ void DobotRobot::stop() noexcept {
       if (group_.state == DeviceState::kDisconnected || group_.state == DeviceState::kConnected) return;
       group_.is_target_current = group_.is_in_position = false;
     }
-    shut_pulses();
+    end_pulses();
     ports_.dashboard(dobot::encode("ResetRobot"), DobotPorts::kUrgentS);
     ports_.forget_owed();
   } catch (const std::exception& error) {

@@ -43,7 +43,7 @@ class DobotRobot final : public Robot {
   /// immediate and clears the queue if a pulse may be in it. Owned by the robot.
   Gate& gate(int output);
 
-  /// What it says of itself, a line each, for people. Connected or more. @throws DriverError
+  /// What the controller reports about itself, a line each, for the operator. Connected or more. @throws DriverError
   std::vector<std::string> identify();
 
  private:
@@ -56,13 +56,13 @@ class DobotRobot final : public Robot {
   bool is_at_rest(const dobot::Frame& frame) const;
   bool is_within_window(const dobot::Frame& frame) const;
   void fail(const std::string& sentence);
-  void shut_gates() noexcept;
-  void shut_pulses() noexcept;
+  void close_gates() noexcept;
+  void end_pulses() noexcept;
   void wait_for_alarm_end();
   bool set_fault(const std::string& sentence);
   void wait_for_mode(dobot::Mode mode, double cell_s, const char* participle);
   double travel_s(const dobot::Joints& from, const dobot::Joints& to) const;
-  Positions ours(const dobot::Joints& joints) const;
+  Positions to_si(const dobot::Joints& joints) const;
 
   const DobotOptions options_;
   Clock& clock_;
@@ -75,7 +75,7 @@ class DobotRobot final : public Robot {
   dobot::Joints target_{};
   std::size_t queued_ = 0;         ///< targets since it was in position, or stopped
   std::uint64_t accepted_ms_ = 0;  ///< controller's time of the last frame before the target was accepted
-  double rest_ms_ = -1;            ///< controller's time since when it rests at the target; negative: it doesn't
+  double rest_ms_ = -1;            ///< controller's time since when it rests at the target; negative: it does not
   std::map<int, std::unique_ptr<OutputGate>> gates_;
 
   DobotPorts ports_;  ///< last: its reader uses all of the above

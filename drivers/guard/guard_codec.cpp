@@ -16,7 +16,7 @@ constexpr std::array<std::pair<const char*, Verb>, 12> kVerbs{{{"connect", Verb:
                                                                {"arm", Verb::kArm},
                                                                {"disarm", Verb::kDisarm},
                                                                {"power", Verb::kPower},
-                                                               {"look", Verb::kLook},
+                                                               {"request-status", Verb::kRequestStatus},
                                                                {"clear", Verb::kClear},
                                                                {"pulse", Verb::kPulse},
                                                                {"gate-off", Verb::kGateOff},
@@ -84,7 +84,7 @@ std::optional<Reply> decode_reply(std::string_view message) {
 std::string encode(const StatusMessage& message) {
   const std::string text = "status " + std::to_string(static_cast<int>(message.status.state)) +
                            (message.status.interlock_closed ? " 1" : " 0") + (message.is_gate_on ? " 1 " : " 0 ") +
-                           std::to_string(message.read_ns) + ' ' + std::to_string(message.looks) + ' ';
+                           std::to_string(message.read_ns) + ' ' + std::to_string(message.requested_readings) + ' ';
   return (text + message.status.fault).substr(0, kMessageMax);
 }
 
@@ -94,7 +94,7 @@ std::optional<StatusMessage> decode_status(std::string_view message) {
   int state = 0, is_closed = 0, is_gate_on = 0;
   if (!read(take_word(message), state) || !read(take_word(message), is_closed) ||
       !read(take_word(message), is_gate_on) || !read(take_word(message), result.read_ns) ||
-      !read(take_word(message), result.looks))
+      !read(take_word(message), result.requested_readings))
     return std::nullopt;
   if (state < 0 || state > static_cast<int>(DeviceState::kFault) || (is_closed & ~1) != 0 || (is_gate_on & ~1) != 0)
     return std::nullopt;

@@ -13,13 +13,26 @@ namespace hilbrush::guard {
 
 inline constexpr std::size_t kMessageMax = 4096;
 
-/// kLight: a gate that is not the laser's own opens, and will be reported shut by kDark within `value` seconds. These
-/// two and kLook get no reply.
-enum class Verb { kConnect, kIdentify, kPowers, kArm, kDisarm, kPower, kLook, kClear, kPulse, kGateOff, kLight, kDark };
+/// kLight: a gate that is not the laser's own opens, and will be reported closed by kDark within `value` seconds. These
+/// two and kRequestStatus get no reply.
+enum class Verb {
+  kConnect,
+  kIdentify,
+  kPowers,
+  kArm,
+  kDisarm,
+  kPower,
+  kRequestStatus,
+  kClear,
+  kPulse,
+  kGateOff,
+  kLight,
+  kDark
+};
 
 struct Request {
   std::uint32_t number = 0;
-  Verb verb = Verb::kLook;
+  Verb verb = Verb::kRequestStatus;
   double value = 0;  ///< W of kPower, s of kPulse and kLight
 };
 std::string encode(const Request& request);
@@ -40,7 +53,7 @@ struct StatusMessage {
   LaserHead::Status status;  ///< read_s is not sent
   std::int64_t read_ns = 0;  ///< when its reading was begun, on the machine's monotonic clock
   bool is_gate_on = false;
-  std::uint64_t looks = 0;  ///< readings that were asked for and have come
+  std::uint64_t requested_readings = 0;  ///< how many of them have come
 };
 std::string encode(const StatusMessage& message);
 std::optional<StatusMessage> decode_status(std::string_view message);

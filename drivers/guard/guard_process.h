@@ -28,7 +28,7 @@ class GuardProcess {
   int pid_ = -1;
 };
 
-/// What a guard is told on its command line.
+/// A guard's command line.
 struct GuardArguments {
   std::string driver = "obis";  ///< or "cobolt"
   bool has_own_gate = false;

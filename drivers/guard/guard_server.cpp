@@ -29,11 +29,11 @@ GuardServer::GuardServer(LaserHead& head, Gate* gate, int channel, int signals, 
   head_.set_listener([this] {
     {
       const std::lock_guard lock(mutex_);
-      ++looks_;
+      ++requested_readings_;
     }
     send_status();
   });
-  // A gate that can't be shut leaves only the emission to be turned off.
+  // If the gate cannot be closed, only disarming the head turns the light off.
   if (gate_ != nullptr)
     gate_->set_listener([this](bool is_dark) {
       if (!is_dark) head_.disarm();
@@ -69,7 +69,7 @@ void GuardServer::send_status() {
   message.is_gate_on = gate_ != nullptr && gate_->is_on();
   {
     const std::lock_guard lock(mutex_);
-    message.looks = looks_;
+    message.requested_readings = requested_readings_;
     if (!trip_.empty()) {
       message.status.state = DeviceState::kFault;
       message.status.fault = trip_;
@@ -114,13 +114,13 @@ GuardServer::End GuardServer::run() {
     }
     if (end) break;
     if (has_beaten_ && Steady::now() >= beat_deadline) {
-      has_beaten_ = false;  // the watch begins anew when the user is heard again
+      has_beaten_ = false;  // watched again after the next heartbeat
       trip("the laser's guard heard nothing of its user for " + std::to_string(std::lround(allowance_s * 1e3)) +
            " ms and turned the laser off");
     }
     if (dark_deadline_ && Steady::now() >= *dark_deadline_) {
       dark_deadline_.reset();
-      trip("the laser's guard was not told in time that a pulse was over and turned the laser off");
+      trip("the laser's guard received no report in time that a pulse was over and turned the laser off");
     }
     if (Steady::now() >= status_deadline) {
       status_deadline = deadline_in(kStatusS);
@@ -152,7 +152,7 @@ std::optional<GuardServer::End> GuardServer::read_channel() {
 }
 
 void GuardServer::obey_at_once(const guard::Request& request) {
-  if (request.verb == guard::Verb::kLook) return head_.look();
+  if (request.verb == guard::Verb::kRequestStatus) return head_.request_status();
   if (request.verb == guard::Verb::kDark) return dark_deadline_.reset();
   if (request.verb == guard::Verb::kLight) {
     dark_deadline_ = deadline_in(std::clamp(request.value, 0., kLightMaxS));
@@ -243,7 +243,7 @@ std::string GuardServer::carry_out(const guard::Request& request) {
       gate_->pulse(request.value);
       return {};
     case guard::Verb::kDisarm:
-    case guard::Verb::kLook:
+    case guard::Verb::kRequestStatus:
     case guard::Verb::kGateOff:
     case guard::Verb::kLight:
     case guard::Verb::kDark:

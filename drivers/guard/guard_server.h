@@ -16,10 +16,10 @@
 namespace hilbrush {
 
 /// The guard's side of the channel: obeys requests, and disarms the laser by itself when heartbeats are missing, when
-/// the channel ends, when it carries garbage, when the end of a pulse that was announced is not reported in time, or
-/// when a signal asks the guard to end. A missing heartbeat, and a missing end, latch until the user clears them.
-/// Requests that wait for the laser run on a thread of their own, so that heartbeats are always heard; disarming and
-/// shutting the gate don't wait for them.
+/// the channel ends, when it carries an invalid message, when the end of a pulse that was announced is not reported in
+/// time, or when a signal asks the guard to end. A missing heartbeat, and a missing end, latch until the user clears
+/// them. Requests that wait for the laser run on a thread of their own, so that heartbeats are always heard; disarming
+/// and closing the gate do not wait for them.
 class GuardServer {
  public:
   enum class End { kChannelEnded, kGarbage, kSignal };
@@ -59,8 +59,8 @@ class GuardServer {
   std::mutex mutex_;  ///< of what follows
   std::condition_variable ordered_;
   std::deque<guard::Request> requests_;
-  std::string trip_;  ///< why it disarmed by itself; empty if it didn't, or was cleared
-  std::uint64_t looks_ = 0;
+  std::string trip_;  ///< why it disarmed by itself; empty if it did not, or was cleared
+  std::uint64_t requested_readings_ = 0;
   bool is_ending_ = false;
   bool has_beaten_ = false;                ///< the watch begins with the first heartbeat
   std::optional<Deadline> dark_deadline_;  ///< of the pulse that was announced; run()'s thread

@@ -110,7 +110,7 @@ void GuardedHead::close_channel() noexcept {
 void GuardedHead::send(const std::string& message) {
   if (channel_ < 0) throw LinkError("the laser's guard is not running");
   if (::send(channel_, message.data(), message.size(), MSG_NOSIGNAL | MSG_DONTWAIT) < 0)
-    throw LinkError(std::string("the laser's guard can't be reached: ") + std::strerror(errno));
+    throw LinkError(std::string("the laser's guard cannot be reached: ") + std::strerror(errno));
 }
 
 void GuardedHead::lose(const std::string& sentence) {
@@ -168,7 +168,7 @@ bool GuardedHead::read_messages() {
       continue;
     }
     auto reply = guard::decode_reply(message);
-    if (!reply) throw LinkError("the laser's guard talks nonsense");
+    if (!reply) throw LinkError("invalid message from the laser guard");
     const std::lock_guard lock(mutex_);
     const auto waiting = replies_.find(reply->number);
     if (waiting != replies_.end()) waiting->second = std::make_unique<guard::Reply>(std::move(*reply));
@@ -185,9 +185,9 @@ void GuardedHead::take(const guard::StatusMessage& message) {
     Status status = message.status;
     status.read_s = clock_.now_s() - std::chrono::duration<double>(age).count() / (scale > 0 ? scale : 1);
     is_dark = is_gate_on_ && !message.is_gate_on;
-    is_news = message.looks != looks_ || status.state != status_.state || is_dark ||
+    is_news = message.requested_readings != requested_readings_ || status.state != status_.state || is_dark ||
               status.interlock_closed != status_.interlock_closed;
-    looks_ = message.looks;
+    requested_readings_ = message.requested_readings;
     is_gate_on_ = message.is_gate_on;
     status_ = std::move(status);
   }
@@ -222,7 +222,7 @@ void GuardedHead::connect() {
     request(guard::Verb::kConnect, 0, kReplyS);
     const std::string powers = request(guard::Verb::kPowers, 0, kReplyS);
     if (std::sscanf(powers.c_str(), "%lf %lf", &powers_.min_w, &powers_.max_w) != 2)
-      throw DriverError("the laser's guard talks nonsense");
+      throw DriverError("invalid message from the laser guard");
     power_w_ = -1;
   } catch (const DriverError&) {
     close_channel();
@@ -271,33 +271,33 @@ LaserHead::Status GuardedHead::status() {
 }
 
 /// What gets no reply.
-void GuardedHead::tell(guard::Verb verb, double value) {
+void GuardedHead::post(guard::Verb verb, double value) {
   const std::lock_guard lock(mutex_);
   if (!lost_.empty()) throw LinkError(lost_);
   send(guard::encode(guard::Request{next_number_++, verb, value}));
 }
 
-void GuardedHead::look() {
+void GuardedHead::request_status() {
   try {
-    tell(guard::Verb::kLook, 0);
+    post(guard::Verb::kRequestStatus, 0);
   } catch (const DriverError&) {
     // The thread that listens to the guard notices the same.
   }
 }
 
 void GuardedHead::begin_pulse(double pulse_s) {
-  tell(guard::Verb::kLight, clock_.wall_s(pulse_s) + options_.pulse_grace_s);
+  post(guard::Verb::kLight, clock_.wall_s(pulse_s) + options_.pulse_grace_s);
 }
 
 void GuardedHead::end_pulse() noexcept {
   try {
-    tell(guard::Verb::kDark, 0);
+    post(guard::Verb::kDark, 0);
   } catch (const std::exception&) {
-    // A guard that can't be told turns emission off, which is as safe.
+    // A guard that hears of no end turns emission off, which is as safe.
   }
 }
 
-/// A guard that was lost is started anew.
+/// A guard that was lost is started again.
 void GuardedHead::clear_fault() {
   bool is_lost = false;
   {

@@ -21,9 +21,9 @@ class GuardedHead final : public LaserHead {
  public:
   struct Options {
     double heartbeat_s = 0.02;
-    double silence_s = 0.5;      ///< wall: a guard that says nothing for so long is lost
+    double silence_s = 0.5;      ///< wall: a guard that is silent for longer is lost
     double arm_timeout_s = 30;   ///< cell: what the guard's own arming may take
-    double pulse_grace_s = 0.2;  ///< wall: later than that after its time a pulse's end ends emission
+    double pulse_grace_s = 0.2;  ///< wall: a pulse whose end is reported later than this ends emission
   };
   /// Starts (again) a guard; returns this side's end of its channel. @throws DriverError
   using Launch = std::function<int()>;
@@ -38,7 +38,7 @@ class GuardedHead final : public LaserHead {
   bool disarm() noexcept override;
   void set_power(double power_w) override;
   Status status() override;
-  void look() override;
+  void request_status() override;
   void begin_pulse(double pulse_s) override;
   void end_pulse() noexcept override;
   void clear_fault() override;
@@ -57,7 +57,7 @@ class GuardedHead final : public LaserHead {
   void lose(const std::string& sentence);
   std::string request(guard::Verb verb, double value, double wall_s);
   void send(const std::string& message);
-  void tell(guard::Verb verb, double value);
+  void post(guard::Verb verb, double value);
 
   const Launch launch_;
   const Options options_;
@@ -76,7 +76,7 @@ class GuardedHead final : public LaserHead {
   std::map<std::uint32_t, std::unique_ptr<guard::Reply>> replies_;  ///< null: still waited for
   Status status_;
   bool is_gate_on_ = false;
-  std::uint64_t looks_ = 0;
+  std::uint64_t requested_readings_ = 0;
   std::thread thread_;
 };
 

@@ -8,6 +8,7 @@
 #include "drivers/driver_error.h"
 #include "drivers/laser/cobolt_codec.h"
 #include "drivers/link/line_codec.h"
+#include "drivers/number_text.h"
 
 namespace hilbrush {
 namespace {
@@ -42,7 +43,7 @@ void CoboltHead::set_up() {
   try {
     order("l0");
   } catch (const DriverError&) {
-    order("l0");  // the first may have met the rest of somebody else's line
+    order("l0");  // the first may have been appended to an unfinished line
   }
   order("@cob0");
 }
@@ -51,7 +52,7 @@ LaserHead::Powers CoboltHead::read_powers() {
   return {0, ask_number("glp?") * 1e-3};
 }
 
-/// The mode alone says that all is well; what is wrong is asked only then, because commands must keep their distance.
+/// The mode alone shows that there is no fault; only otherwise is the fault read, because of the gap between commands.
 LineLaser::Condition CoboltHead::read_condition() {
   const auto mode = static_cast<cobolt::Mode>(ask_integer("gom?"));
   Condition condition;
@@ -69,7 +70,7 @@ void CoboltHead::prepare_arming() {
   order("cf");
   order("em");
   order(std::string("LASer:PM:DIG:MODulator ") + (is_gated_by_line_ ? "External" : "Command"));
-  if (!is_gated_by_line_) shut_beam();
+  if (!is_gated_by_line_) close_beam();
 }
 
 void CoboltHead::order_emission() {
@@ -92,8 +93,8 @@ void CoboltHead::open_beam() {
   say(cobolt::kOpen, kSayS);
 }
 
-void CoboltHead::shut_beam() {
-  say(cobolt::kShut, kSayS);
+void CoboltHead::close_beam() {
+  say(cobolt::kClose, kSayS);
 }
 
 bool CoboltHead::is_answering() noexcept {
@@ -126,17 +127,19 @@ void CoboltGate::set_listener(Listener listener) {
 }
 
 void CoboltGate::pulse(double pulse_s) {
-  if (!(pulse_s > 0) || pulse_s > kGatePulseMaxS) throw DriverError("the laser refuses a pulse that is no pulse");
+  if (!(pulse_s > 0) || pulse_s > kGatePulseMaxS)
+    throw DriverError("the laser refuses a pulse of " + number_text(pulse_s, 6) + " s: its limit is " +
+                      number_text(kGatePulseMaxS, 6) + " s");
   {
     const std::lock_guard lock(mutex_);
     if (is_open_) throw DriverError("the laser refuses a pulse: the last one is not over");
-    if (has_failed_) throw DriverError("the laser refuses a pulse: its beam could not be shut");
+    if (has_failed_) throw DriverError("the laser refuses a pulse: its beam could not be closed");
     is_open_ = true;
     is_known_off_ = false;
     try {
       head_.open_beam();
     } catch (const DriverError&) {
-      end_ = {};  // whether it was heard is not known: shut at once
+      end_ = {};  // whether it was received is not known: close at once
       ordered_.notify_all();
       throw;
     }
@@ -145,13 +148,13 @@ void CoboltGate::pulse(double pulse_s) {
   ordered_.notify_all();
 }
 
-/// Under the lock, which is given up while the listener is told.
-void CoboltGate::shut(std::unique_lock<std::mutex>& lock) {
+/// Under the lock, which is released while the listener is called.
+void CoboltGate::close_beam(std::unique_lock<std::mutex>& lock) {
   try {
-    head_.shut_beam();
+    head_.close_beam();
     is_open_ = has_failed_ = false;
   } catch (const DriverError&) {
-    has_failed_ = true;  // stays open as far as anybody knows
+    has_failed_ = true;  // must be taken as still open
   }
   const Listener listener = listener_;
   const bool is_dark = !has_failed_;
@@ -170,7 +173,7 @@ void CoboltGate::run() {
       continue;
     }
     ordered_.wait_until(lock, end_, [this] { return is_ending_ || !is_open_; });
-    if (is_open_) shut(lock);
+    if (is_open_) close_beam(lock);
   }
 }
 
@@ -178,7 +181,7 @@ bool CoboltGate::off() noexcept {
   try {
     std::unique_lock lock(mutex_);
     if (is_known_off_ && !is_open_) return true;
-    shut(lock);
+    close_beam(lock);
     if (has_failed_) return false;
     lock.unlock();
     ordered_.notify_all();

@@ -20,8 +20,8 @@ class CoboltHead final : public LineLaser {
       : LineLaser(options, options.command_gap_s, clock), is_gated_by_line_(is_gated_by_line) {}
   ~CoboltHead() override { end_polling(); }
 
-  void open_beam();  ///< !e
-  void shut_beam();  ///< !d
+  void open_beam();   ///< !e
+  void close_beam();  ///< !d
   bool is_answering() noexcept;
 
  private:
@@ -42,9 +42,9 @@ class CoboltHead final : public LineLaser {
   const bool is_gated_by_line_;
 };
 
-/// The serial gate: a thread of its own ends each pulse. Nothing else bounds it, so it belongs into a process that
-/// survives its user: see guard_server.h. The laser does not answer !d, so off() asks it something afterwards: whoever
-/// answers has obeyed.
+/// The serial gate: a thread of its own ends each pulse. Nothing else bounds it, so it belongs in a process that
+/// survives its user: see guard_server.h. The laser does not answer !d, so off() sends a query afterwards: a
+/// laser that answers it has carried out !d.
 class CoboltGate final : public Gate {
  public:
   CoboltGate(CoboltHead& head, Clock& clock);
@@ -58,7 +58,7 @@ class CoboltGate final : public Gate {
 
  private:
   void run();
-  void shut(std::unique_lock<std::mutex>& lock);
+  void close_beam(std::unique_lock<std::mutex>& lock);
 
   CoboltHead& head_;
   Clock& clock_;

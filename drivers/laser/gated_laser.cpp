@@ -123,7 +123,7 @@ void GatedLaser::note_dark() {
     gate_dark_s_ = clock_.now_s();
   }
   head_->end_pulse();  // before the next can begin
-  head_->look();
+  head_->request_status();
 }
 
 /// Any thread.

@@ -16,7 +16,7 @@ namespace hilbrush {
 /// cut it is seen before the pulse is believed.
 class GatedLaser final : public Laser {
  public:
-  /// `limits` are the cell file's; what the device itself allows is looked at when it is connected. `gate` and `clock`
+  /// `limits` are the cell file's; the device's own limits are checked when it is enabled. `gate` and `clock`
   /// outlive it.
   GatedLaser(std::unique_ptr<LaserHead> head, Gate& gate, const Limits& limits, Clock& clock);
   ~GatedLaser() override;
@@ -25,7 +25,7 @@ class GatedLaser final : public Laser {
   Limits limits() override { return limits_; }
   void enable() override;
   void disable() noexcept override;
-  /// Sets the head's power while the gate is shut.
+  /// Sets the head's power while the gate is closed.
   void prepare(double power_w, double pulse_s) override;
   void fire(double power_w, double pulse_s) override;
   bool off() noexcept override;

@@ -215,7 +215,7 @@ LaserHead::Status LineLaser::status() {
   return {state_, is_closed, fault_, read_s_};
 }
 
-void LineLaser::look() {
+void LineLaser::request_status() {
   {
     const std::lock_guard lock(mutex_);
     is_request_due_ = true;

@@ -28,7 +28,7 @@ class LineLaser : public LaserHead {
   bool disarm() noexcept override;
   void set_power(double power_w) override;
   Status status() override;
-  void look() override;
+  void request_status() override;
   void clear_fault() override;
   void set_listener(std::function<void()> on_change) override { on_change_ = std::move(on_change); }
 

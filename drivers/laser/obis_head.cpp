@@ -23,7 +23,7 @@ std::string ObisHead::exchange(Link& link, LineReader& lines, const std::string&
   }
 }
 
-/// What a laser does not keep is not relied on: CDRH delay and autostart are safety.
+/// Safety depends on the CDRH delay and on autostart, so they are read back.
 void ObisHead::set_switch(const std::string& name, bool is_on) {
   ask(name + (is_on ? " ON" : " OFF"));
   const std::string line = ask(name + "?");
@@ -31,8 +31,8 @@ void ObisHead::set_switch(const std::string& name, bool is_on) {
     throw DriverError("the laser does not keep " + name + (is_on ? " ON" : " OFF") + ": it says \"" + line + "\"");
 }
 
-/// The first command may meet a laser whose handshake is off and that answers nothing, or the rest of an exchange that
-/// somebody else began, so it may fail once.
+/// The first command may meet a laser whose handshake is off and that answers nothing, or an exchange that
+/// another program left unfinished, so it may fail once.
 void ObisHead::set_up() {
   try {
     ask("SYST:COMM:HAND ON");
@@ -61,7 +61,7 @@ std::string ObisHead::read_faults(const Condition&) {
   return ask_faults();
 }
 
-/// The fault bit comes with an open interlock too, which has its own words.
+/// The fault bit comes with an open interlock too, which is reported as such.
 LineLaser::Condition ObisHead::read_condition() {
   const std::string line = ask("SYST:STAT?");
   const auto word = obis::decode_hex_word(line);

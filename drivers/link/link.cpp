@@ -59,7 +59,7 @@ bool Link::wait_for(short events, Deadline deadline) {
     if (ready < 0 && errno == EINTR) continue;
     if (ready < 0) lost(std::strerror(errno));
     if (polled[1].revents != 0) lost("the link was closed");
-    // What arrived before a hang-up is still read: a hang-up is told by the read that finds nothing more.
+    // What arrived before a hang-up is still read: the read that finds nothing more reports the hang-up.
     if (polled[0].revents != 0) return true;
     if (Steady::now() >= deadline) return false;
   }

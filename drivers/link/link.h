@@ -9,11 +9,11 @@
 #include "drivers/driver_error.h"
 #include "drivers/link/message_ring.h"
 
-/// Byte links to devices: TCP, and serial ports by libserialport. Every call has a deadline in wall time; hang-ups are
-/// told from silence.
+/// Byte links to devices: TCP, and serial ports by libserialport. Every call has a deadline in wall time; a
+/// hang-up is distinguished from silence.
 namespace hilbrush {
 
-/// The wire is gone, or what came over it can't be brought in step again: the link has to be opened anew.
+/// The connection is lost, or it is not known which command an answer belongs to: the link must be opened again.
 struct LinkError : DriverError {
   using DriverError::DriverError;
 };
@@ -58,7 +58,8 @@ class Link {
   MessageRing messages_;
 };
 
-/// @throws LinkError "HOST:PORT: ..." if nobody accepts by the deadline. Small messages are sent at once (no Nagle).
+/// @throws LinkError "HOST:PORT: ..." if no connection is accepted by the deadline. Small messages are sent at once (no
+/// Nagle).
 std::unique_ptr<Link> open_tcp_link(const std::string& host, std::uint16_t port, Deadline deadline);
 
 enum class Parity { kNone, kEven, kOdd };
@@ -69,7 +70,7 @@ std::unique_ptr<Link> open_serial_link(const std::string& port, int baud, Parity
 /// A serial device's path, or "tcp://HOST:PORT" for a serial device server. @throws LinkError
 std::unique_ptr<Link> open_link(const std::string& port, int baud, Parity parity, Deadline deadline);
 
-/// Reads a byte stream as lines that end with any of CR and LF; empty lines don't count.
+/// Reads a byte stream as lines that end with any of CR and LF; empty lines are skipped.
 class LineReader {
  public:
   static constexpr std::size_t kLineMax = 256;

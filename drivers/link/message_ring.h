@@ -18,7 +18,7 @@ class MessageRing {
   void sent(std::string_view message) { add(true, message); }
   void received(std::string_view message) { add(false, message); }
   /// ` (last messages: sent "RobotMode()" 12.1 ms ago; received "0,{5},RobotMode();" 11.8 ms ago)`, oldest first, at
-  /// most `count`; empty if there were none. Bytes that don't print are shown as \xNN.
+  /// most `count`; empty if there were none. Bytes that do not print are shown as \xNN.
   std::string text(std::size_t count = 4) const;
 
  private:

@@ -42,8 +42,8 @@ sp_parity to_library(Parity parity) {
 
 }  // namespace
 
-/// Reading and writing go through the port's descriptor and poll(), because the library tells a hang-up from silence
-/// neither when reading (0 bytes) nor when waiting.
+/// Reading and writing go through the port's descriptor and poll(), because the library does not distinguish a
+/// hang-up from silence, neither when reading (0 bytes) nor when waiting.
 std::unique_ptr<Link> open_serial_link(const std::string& name, int baud, Parity parity) {
   const auto check = [&](sp_return result, const char* what) {
     if (result == SP_OK) return;
@@ -52,12 +52,12 @@ std::unique_ptr<Link> open_serial_link(const std::string& name, int baud, Parity
   sp_port* found = nullptr;
   check(sp_get_port_by_name(name.c_str(), &found), "no such serial port");
   Port port(found);
-  check(sp_open(found, SP_MODE_READ_WRITE), "can't be opened");
-  check(sp_set_baudrate(found, baud), "can't be set to its baud rate");
-  check(sp_set_bits(found, 8), "can't be set to 8 data bits");
-  check(sp_set_parity(found, to_library(parity)), "can't be set to its parity");
-  check(sp_set_stopbits(found, 1), "can't be set to 1 stop bit");
-  check(sp_set_flowcontrol(found, SP_FLOWCONTROL_NONE), "can't be set to no flow control");
+  check(sp_open(found, SP_MODE_READ_WRITE), "cannot be opened");
+  check(sp_set_baudrate(found, baud), "cannot be set to its baud rate");
+  check(sp_set_bits(found, 8), "cannot be set to 8 data bits");
+  check(sp_set_parity(found, to_library(parity)), "cannot be set to its parity");
+  check(sp_set_stopbits(found, 1), "cannot be set to 1 stop bit");
+  check(sp_set_flowcontrol(found, SP_FLOWCONTROL_NONE), "cannot be set to no flow control");
   sp_flush(found, SP_BUF_BOTH);
   int fd = -1;
   check(sp_get_port_handle(found, &fd), "has no descriptor");

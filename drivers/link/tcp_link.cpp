@@ -79,7 +79,7 @@ std::unique_ptr<Link> open_tcp_link(const std::string& host, std::uint16_t port,
     }
     ::close(fd);
   }
-  throw LinkError(name + ": can't be connected: " + std::strerror(error));
+  throw LinkError(name + ": cannot be connected: " + std::strerror(error));
 }
 
 std::unique_ptr<Link> open_link(const std::string& port, int baud, Parity parity, Deadline deadline) {
@@ -90,7 +90,7 @@ std::unique_ptr<Link> open_link(const std::string& port, int baud, Parity parity
   const char* end = port.data() + port.size();
   const auto [rest, error] = std::from_chars(port.data() + colon + 1, end, number);
   if (colon < kScheme.size() || error != std::errc() || rest != end || number == 0)
-    throw LinkError(port + ": no address of the form tcp://HOST:PORT");
+    throw LinkError(port + ": not an address of the form tcp://HOST:PORT");
   return open_tcp_link(port.substr(kScheme.size(), colon - kScheme.size()), number, deadline);
 }
 

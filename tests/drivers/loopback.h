@@ -42,7 +42,7 @@ class LoopbackServer {
   LoopbackServer& operator=(const LoopbackServer&) = delete;
 
   std::uint16_t port() const { return port_; }
-  /// To whoever is connected, from any thread; false if nobody is.
+  /// Sends to the connected client, from any thread; false if there is none.
   bool send(std::string_view bytes) {
     const std::lock_guard lock(mutex_);
     return connection_ >= 0 && ::send(connection_, bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0;

@@ -1,7 +1,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <cstdio>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -9,12 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/number_text.h"
 #include "tests/drivers/loopback.h"
 
 namespace hilbrush::test {
 
 /// The other end of a Modbus TCP connection: registers that are read and written, and every write as it came over the
-/// wire, from the unit's number on. `obey` is told of each write, with all registers of its unit.
+/// wire, from the unit's number on. `obey` is called for each write, with all registers of its unit.
 class ModbusPeer {
  public:
   using Registers = std::map<int, std::uint16_t>;
@@ -31,12 +31,12 @@ class ModbusPeer {
     const std::lock_guard lock(mutex_);
     return std::exchange(writes_, {});
   }
-  /// How many reads came after the last write: whoever made it has had its answer, or given it up.
+  /// How many reads came after the last write: its sender has had the answer, or given up.
   std::size_t reads_since_write() {
     const std::lock_guard lock(mutex_);
     return reads_since_write_;
   }
-  /// So many further writes get no answer, though they are obeyed.
+  /// This many further writes get no answer, though they are carried out.
   void be_silent(int writes) {
     const std::lock_guard lock(mutex_);
     silent_writes_ = writes;
@@ -88,11 +88,8 @@ class ModbusPeer {
 
   void note_write(const std::array<std::uint8_t, 260>& frame, std::size_t length) {
     std::string text;
-    char digits[4];
-    for (std::size_t i = 6; i < 6 + length; ++i) {
-      std::snprintf(digits, sizeof digits, "%02X", frame[i]);
-      text += (text.empty() ? "" : " ") + std::string(digits);
-    }
+    for (std::size_t i = 6; i < 6 + length; ++i)
+      text += (text.empty() ? "" : " ") + hex_text(static_cast<unsigned char>(frame[i]), 2);
     writes_.push_back(text);
   }
 

@@ -158,7 +158,7 @@ TEST_P(WiredAxes, ALostConnectionIsAFaultThatCanBeCleared) {
   move({.1, .3});
 }
 
-/// More clients than select() can count must not end the daemon when the table is connected anew.
+/// More clients than select() can count must not end the daemon when the table is connected again.
 TEST(ModbusBusTest, TooManyDescriptorsAreASentence) {
   ModbusPeer peer([](ModbusPeer::Registers&) {});
   ModbusEndpoint endpoint;

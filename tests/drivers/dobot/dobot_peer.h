@@ -30,20 +30,20 @@ inline std::string dobot_packet(const dobot::Frame& frame) {
   return bytes;
 }
 
-/// A Dobot controller that does nothing by itself: it takes all it is told, and shows the frames it is given.
+/// A Dobot controller that does nothing by itself: it accepts every command, and sends the frames it is given.
 class DobotPeer {
  public:
   std::uint16_t dashboard_port() const { return dashboard_.port(); }
   std::uint16_t motion_port() const { return motion_.port(); }
   std::uint16_t feedback_port() const { return feedback_.port(); }
 
-  /// To whoever listens to the feedback; waits until somebody does.
+  /// Sends to the client of the feedback port; waits until there is one.
   void show(const dobot::Frame& frame) {
     while (!feedback_.send(dobot_packet(frame))) std::this_thread::yield();
   }
   /// The queue has come to the Sync of a pulse.
   void finish_pulse() { motion_.send("0,{},Sync();"); }
-  /// What the dashboard was told since the last call.
+  /// What the dashboard received since the last call.
   std::vector<std::string> take_orders() { return dashboard_.take(); }
 
  private:

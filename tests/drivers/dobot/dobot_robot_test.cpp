@@ -126,7 +126,7 @@ TEST_F(DobotFrames, LeavingThePlaceDuringAPulseIsSeen) {
   EXPECT_FALSE(is_in_position());
   frame.actual[0] = frame.setpoint[0];
   play(true);
-  EXPECT_FALSE(is_in_position()) << "settling begins anew";
+  EXPECT_FALSE(is_in_position()) << "settling starts again";
   finish_pulse();
   arrive();
 }
@@ -163,7 +163,7 @@ TEST_F(DobotFrames, AnOutputThatNobodyOrderedIsAFault) {
   for (int i = 0; i < 4; ++i) play();  // the frames that may be older than the answer
   frame.digital_outputs = 1 << (kOutput - 1);
   play();
-  EXPECT_EQ(robot.status().fault, "the robot's output 1 is on though nobody ordered it");
+  EXPECT_EQ(robot.status().fault, "the robot's output 1 is on without an order");
 }
 
 }  // namespace

@@ -180,7 +180,7 @@ TEST_F(GuardTest, DisarmsWhenItsUserIsStopped) {
 TEST_F(GuardTest, AMissedHeartbeatLatchesUntilItIsCleared) {
   start();
   arm();
-  EXPECT_LT(milliseconds_until_off(), kAllowanceMs + kSlackMs);  // nobody beats
+  EXPECT_LT(milliseconds_until_off(), kAllowanceMs + kSlackMs);  // no heartbeat is sent
   const guard::Reply refusal = ask(guard::Verb::kArm);
   EXPECT_FALSE(refusal.is_ok);
   EXPECT_NE(refusal.text.find("heard nothing"), std::string::npos) << refusal.text;
@@ -199,7 +199,7 @@ TEST_F(GuardTest, APulseThatIsNotReportedOverInTimeEndsEmissionAndLatches) {
   while (is_emission_ordered() && Steady::now() < deadline) beat();
   EXPECT_FALSE(is_emission_ordered());
   const guard::Reply refusal = ask(guard::Verb::kArm);
-  EXPECT_NE(refusal.text.find("was not told in time that a pulse was over"), std::string::npos) << refusal.text;
+  EXPECT_NE(refusal.text.find("received no report in time that a pulse was over"), std::string::npos) << refusal.text;
   ASSERT_EQ(refusal_of(guard::Verb::kClear), "");
   EXPECT_TRUE(ask(guard::Verb::kArm).is_ok);
 }
@@ -408,7 +408,7 @@ TEST_F(GuardedHeadTest, AMissingProgramIsASentence) {
     head.connect();
     FAIL() << "connected";
   } catch (const DriverError& error) {
-    EXPECT_NE(std::string(error.what()).find("can't be started"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("cannot be started"), std::string::npos) << error.what();
   }
   EXPECT_EQ(head.status().state, DeviceState::kDisconnected);
 }

@@ -42,7 +42,7 @@ TEST(CoboltCodec, CommandsAndAnswers) {
   EXPECT_EQ(cobolt::encode("l0"), "l0\r");
   EXPECT_EQ(cobolt::power_command(.0123), "LASer:PM:POWer:SETPoint 12.300");
   EXPECT_EQ(cobolt::kOpen, "!e\r");
-  EXPECT_EQ(cobolt::kShut, "!d\r");
+  EXPECT_EQ(cobolt::kClose, "!d\r");
   EXPECT_TRUE(cobolt::is_ok("OK\r"));
   EXPECT_FALSE(cobolt::is_ok("Syntax error: illegal command"));
   EXPECT_EQ(cobolt::fault_text(3), "interlock");
@@ -75,7 +75,7 @@ TEST(GuardCodec, MessagesComeBackAsTheyWere) {
   message.status = {DeviceState::kFault, true, "the interlock was opened", 0};
   message.read_ns = 1234567890123;
   message.is_gate_on = true;
-  message.looks = 9;
+  message.requested_readings = 9;
   const auto status = guard::decode_status(guard::encode(message));
   ASSERT_TRUE(status);
   EXPECT_EQ(status->status.state, DeviceState::kFault);
@@ -83,7 +83,7 @@ TEST(GuardCodec, MessagesComeBackAsTheyWere) {
   EXPECT_EQ(status->status.fault, "the interlock was opened");
   EXPECT_EQ(status->read_ns, 1234567890123);
   EXPECT_TRUE(status->is_gate_on);
-  EXPECT_EQ(status->looks, 9u);
+  EXPECT_EQ(status->requested_readings, 9u);
 }
 
 TEST(GuardCodec, AnythingElseIsNoMessage) {
