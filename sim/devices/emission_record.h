@@ -45,8 +45,8 @@ class EmissionRecordFile {
   std::size_t whole_bytes_ = 0;
 };
 
-/// A torn last record is dropped. @throws std::runtime_error naming the file if it can't be read, is no emission
-/// record, or is damaged anywhere but at its end.
+/// A torn last record is dropped. @throws std::runtime_error naming the file if it cannot be read, is not an
+/// emission record, or is damaged anywhere but at its end.
 std::vector<Emission> read_emission_record(const std::filesystem::path& file);
 
 }  // namespace hilbrush

@@ -1,9 +1,10 @@
 #include "sim/devices/sim_laser.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <thread>
 
 #include "drivers/driver_error.h"
@@ -68,11 +69,11 @@ void SimLaser::fire(double power_w, double pulse_s) {
   if (is_emitting(now)) throw DriverError("the laser cannot be fired: it is still emitting");
   if (!is_within(power_w, limits_.power_min_w, limits_.power_max_w) ||
       !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s)) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "the laser refuses a pulse of %.4g W and %.4g ms: its limits are %.4g to %.4g W and %.4g to %.4g ms",
-                  power_w, pulse_s * 1e3, limits_.power_min_w, limits_.power_max_w, limits_.pulse_min_s * 1e3,
-                  limits_.pulse_max_s * 1e3);
+    const std::string text = fmt::format(
+        "the laser refuses a pulse of {:.4g} W and {:.4g} ms: its limits are {:.4g} to {:.4g} W and {:.4g} to {:.4g} "
+        "ms",
+        power_w, pulse_s * 1e3, limits_.power_min_w, limits_.power_max_w, limits_.pulse_min_s * 1e3,
+        limits_.pulse_max_s * 1e3);
     throw DriverError(text);
   }
   const AxesState axes = probe_(now);

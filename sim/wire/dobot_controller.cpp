@@ -1,9 +1,10 @@
 #include "sim/wire/dobot_controller.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "sim/wire/read_number.h"
@@ -33,11 +34,7 @@ double from_wire(std::size_t axis, double value) {
 
 std::string listed(const std::array<double, 4>& values) {
   std::string text;
-  for (const double value : values) {
-    char number[40];
-    std::snprintf(number, sizeof number, "%s%.6f", text.empty() ? "" : ",", value);
-    text += number;
-  }
+  for (const double value : values) text += fmt::format("{}{:.6f}", text.empty() ? "" : ",", value);
   return text;
 }
 
@@ -178,7 +175,7 @@ std::string DobotController::output_command(const Arguments& arguments, bool is_
   return answered(kOk);
 }
 
-/// J1+ ... J4-: at a tenth of the speed towards the limit, until told otherwise.
+/// J1+ ... J4-: at a tenth of the speed towards the limit, until the next order.
 std::string DobotController::jog(const Arguments& arguments) {
   if (!is_enabled() || alarm_ != 0) return answered(kFailed);
   const std::string axis = arguments.empty() ? "" : arguments[0];

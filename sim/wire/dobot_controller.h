@@ -15,8 +15,9 @@
 /// A Dobot 4-axis controller: one queue of motion, waits and outputs, its state, and the three conversations about them
 /// (dashboard, motion, feedback). Joints in degrees, J3 in mm, as the wire has them.
 ///
-/// What is told here, because it can hurt: "accepted" on the motion port is not "done"; outputs keep their level when
-/// the queue is cleared by ResetRobot, an alarm or a power cut of the drives; the queue goes on when the host is gone.
+/// Three properties of real controllers matter for safety: "accepted" on the motion port is not "done"; outputs keep
+/// their level when the queue is cleared by ResetRobot, an alarm or a power cut of the drives; the queue goes on when
+/// the host has disconnected.
 ///
 /// After "TCP/IP Remote Control Interface Guide (4axis)", controller V1.6. Joint-space motion only (JointMovJ, MovJ,
 /// MoveJog); straight lines are refused as unknown.

@@ -1,17 +1,11 @@
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
+#include "sampling/base/text.h"
 #include "sim/wire/dobot_controller.h"
 
 namespace hilbrush {
 namespace {
-
-std::string trimmed(std::string_view text) {
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front()))) text.remove_prefix(1);
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.remove_suffix(1);
-  return std::string(text);
-}
 
 /// Between commas that are in no braces.
 std::vector<std::string> split_arguments(std::string_view list) {
@@ -23,15 +17,10 @@ std::vector<std::string> split_arguments(std::string_view list) {
     if (i < list.size() && (list[i] == '{' || list[i] == '(')) ++depth;
     if (i < list.size() && (list[i] == '}' || list[i] == ')')) --depth;
     if (i < list.size() && (list[i] != ',' || depth > 0)) continue;
-    arguments.push_back(trimmed(list.substr(begin, i - begin)));
+    arguments.emplace_back(trimmed(list.substr(begin, i - begin)));
     begin = i + 1;
   }
   return arguments;
-}
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
 }
 
 }  // namespace
@@ -54,12 +43,12 @@ std::size_t DobotTextSession::message_bytes(std::string_view buffer) const {
 }
 
 std::string DobotTextSession::answer(std::string_view message) {
-  std::string command = trimmed(message);
+  std::string command(trimmed(message));
   while (!command.empty() && command.back() == ';') command.pop_back();
   if (command.empty()) return {};
   const std::size_t open = command.find('(');
   if (open == std::string::npos || command.back() != ')') return "-10000,{}," + command + ";";
-  const std::string name = lower_case(trimmed(command.substr(0, open)));
+  const std::string name = lower_case(trimmed(std::string_view(command).substr(0, open)));
   const auto arguments = split_arguments(std::string_view(command).substr(open + 1, command.size() - open - 2));
   if (port_ == Port::kMotion && (name == "sync" || name == "syncall")) {
     syncs_.push_back({controller_.accepted_count(), controller_.dropped_count(), command});
@@ -80,7 +69,7 @@ void DobotTextSession::run() {
 }
 
 std::string DobotTextSession::refusal(std::string_view message, bool) {
-  return "-1,{}," + trimmed(message) + ";";
+  return "-1,{}," + std::string(trimmed(message)) + ";";
 }
 
 /// The echo is another command's.

@@ -1,29 +1,19 @@
 #include "sim/wire/laser_heads.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
+#include "sampling/base/text.h"
 #include "sim/wire/read_number.h"
 
 namespace hilbrush {
 namespace {
 
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
-  return lower;
-}
-
-std::string printed(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
-constexpr double kSerialNumber = 20117;
+constexpr int kSerialNumber = 20117;
 
 }  // namespace
 
@@ -34,14 +24,13 @@ std::size_t SerialLaser::message_bytes(std::string_view buffer) const {
 }
 
 std::string SerialLaser::answer(std::string_view message) {
-  while (!message.empty() && std::isspace(static_cast<unsigned char>(message.back()))) message.remove_suffix(1);
-  while (!message.empty() && std::isspace(static_cast<unsigned char>(message.front()))) message.remove_prefix(1);
+  message = trimmed(message);
   return message.empty() ? std::string() : answer_line(lower_case(message));
 }
 
 /// A line has no address: what belongs to another exchange is simply another answer.
 std::string SerialLaser::misaddressed(std::string answer) const {
-  return answer.empty() ? answer : printed("%.5f\r\n", .12345) + answer;
+  return answer.empty() ? answer : "0.12345\r\n" + answer;
 }
 
 // ---- Coherent OBIS
@@ -101,15 +90,11 @@ ObisLaser::Reply ObisLaser::obey(const std::string& header, const std::string& p
 ObisLaser::Reply ObisLaser::query(const std::string& header) const {
   const auto value = [](std::string text) -> Reply { return {true, true, std::move(text)}; };
   const auto on_off = [&](bool is_on) { return value(is_on ? "ON" : "OFF"); };
-  const auto watts = [&](double power_w) { return value(printed("%.6f", power_w)); };
-  const auto hex = [&](unsigned word) {
-    char text[16];
-    std::snprintf(text, sizeof text, "%08X", word);
-    return value(text);
-  };
+  const auto watts = [&](double power_w) { return value(fmt::format("{:.6f}", power_w)); };
+  const auto hex = [&](unsigned word) { return value(fmt::format("{:08X}", word)); };
   if (header == "*idn") return value("Coherent, Inc - OBIS 405nm 100mW C - V1.0.2 - simulated");
   if (header == "syst:inf:mod") return value("OBIS 405nm 100mW C");
-  if (header == "syst:inf:snum") return value(printed("%.0f", kSerialNumber));
+  if (header == "syst:inf:snum") return value(std::to_string(kSerialNumber));
   if (header == "syst:inf:wav") return value("405");
   if (header == "syst:inf:pow" || header == "sour:pow:nom") return watts(cell_.description().laser.power_max_w);
   if (header == "syst:inf:fver") return value("V1.0.2");
@@ -119,7 +104,7 @@ ObisLaser::Reply ObisLaser::query(const std::string& header) const {
   if (header == "syst:lock") return on_off(cell_.is_interlock_closed());
   if (header == "syst:stat") return hex(status());
   if (header == "syst:faul") return hex(faults_word());
-  if (header == "syst:err:coun") return value(printed("%.0f", error_count_));
+  if (header == "syst:err:coun") return value(std::to_string(error_count_));
   if (header == "syst:err:nex") return value(error_count_ > 0 ? "-222" : "0");
   if (header == "syst:diod:hour") return value("12.5");
   if (header == "sour:pow:lim:low") return watts(cell_.description().laser.power_min_w);
@@ -169,11 +154,11 @@ std::string CoboltLaser::answer_line(const std::string& line) {
   if (line == "ilk?") return value(cell_.is_interlock_closed() ? "0" : "1");
   if (line == "f?") return value(cell_.is_tripped() || !cell_.is_interlock_closed() ? "3" : "0");
   if (line == "gom?") return value(std::to_string(operating_mode()));
-  if (line == "p?") return value(printed("%.6f", cell_.power_w()));
-  if (line == "pa?") return value(printed("%.6f", cell_.is_emitting() ? cell_.power_w() : 0));
+  if (line == "p?") return value(fmt::format("{:.6f}", cell_.power_w()));
+  if (line == "pa?") return value(fmt::format("{:.6f}", cell_.is_emitting() ? cell_.power_w() : 0));
   if (line == "glm?") return value("0405-06-01-0100-100");
-  if (line == "glp?" || line == "laser:cp:power:max?") return value(printed("%.4f", cell_.power_max_w() * 1e3));
-  if (line == "sn?" || line == "gsn?") return value(printed("%.0f", kSerialNumber));
+  if (line == "glp?" || line == "laser:cp:power:max?") return value(fmt::format("{:.4f}", cell_.power_max_w() * 1e3));
+  if (line == "sn?" || line == "gsn?") return value(std::to_string(kSerialNumber));
   if (line == "gfv?") return value("50070");
   if (line == "hrs?") return value("12.5");
   if (line == "las:paus?") return value(is_paused_ ? "1" : "0");

@@ -19,7 +19,8 @@ void put_word(std::string& bytes, std::uint16_t word) {
   bytes += static_cast<char>(word & 0xff);
 }
 
-/// Bytes of a request on a serial line, known from its head; 0 if more must come, npos for no function of ours.
+/// Bytes of a request on a serial line, known from its head; 0 if more must come, npos for a function that is not
+/// supported.
 std::size_t rtu_bytes(std::string_view buffer) {
   if (buffer.size() < 2) return 0;
   switch (byte_at(buffer, 1)) {
@@ -106,7 +107,7 @@ std::string ModbusServer::answer(std::string_view message) {
   if (!parse(message, request)) return {};
   const auto unit = units_.find(request.unit);
   if (unit == units_.end()) {
-    // On a line nobody answers; a gateway says that nobody did.
+    // On a serial line no unit answers; a TCP gateway reports that.
     if (framing_ == Framing::kRtu) return {};
     return framed(request, exception_pdu(byte_at(request.pdu, 0), ModbusOutcome::kNoSuchUnit));
   }

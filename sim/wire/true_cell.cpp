@@ -55,7 +55,7 @@ void TrueCell::move_axis(std::size_t index, double target, double speed_max, dou
 
 void TrueCell::begin_motion(std::size_t index, double target, double speed_max, double acceleration, double share) {
   Axis& axis = axes_[index];
-  // Light that is on while something begins to move is a fault, whoever asked for either.
+  // Light that is on while something begins to move is a fault, whichever was ordered first.
   if (emission_) emission_->is_moving = true;
   if (times_) times_->note_motion(index < kTilt ? WireDevice::kRobot : WireDevice::kTable, now_s_);
   // An order takes up what had drifted: the controller closes its loop again.

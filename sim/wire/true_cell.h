@@ -25,7 +25,7 @@ class TimeRecord;
 struct TrueCellOptions {
   double start_delay_s = 5;  ///< from the order to emit until light may come (CDRH)
   double warm_up_s = 0;      ///< from time 0
-  double notice_s = .03;     ///< so long an axis must be off before light there is a fault
+  double notice_s = .03;     ///< an axis must be off its target for longer before light there is a fault
 };
 
 class TrueCell {

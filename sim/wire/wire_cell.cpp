@@ -101,7 +101,7 @@ struct WireCell::Implementation {
     catch_up();
     if constexpr (std::is_void_v<decltype(action())>) {
       action();
-      devices.look();
+      devices.observe();
       wake();
     } else {
       return action();
@@ -123,7 +123,7 @@ struct WireCell::Implementation {
 
 void WireCell::Implementation::serve() {
   ::prctl(PR_SET_TIMERSLACK, 1000UL, 0UL, 0UL, 0UL);
-  // A caller who has gone is found out by the write's error, not by a signal.
+  // A client that has disconnected is noticed by the error of a write, not by a signal.
   sigset_t pipe_signal;
   ::sigemptyset(&pipe_signal);
   ::sigaddset(&pipe_signal, SIGPIPE);
@@ -164,7 +164,7 @@ void WireCell::Implementation::wait() {
   const std::size_t first = 1 + listeners.size();
   for (std::size_t i = 0; first + i < polled.size(); ++i)
     if (polled[first + i].revents & (POLLIN | POLLHUP | POLLERR)) connections[i]->read();
-  devices.look();
+  devices.observe();
   take_callers(1);
 }
 

@@ -15,7 +15,7 @@ namespace hilbrush {
 
 class WireCell {
  public:
-  /// @throws std::system_error if there is no port or pseudo-terminal to be had.
+  /// @throws std::system_error if no port or pseudo-terminal is available.
   WireCell(const CellDescription& description, const WireOptions& options);
   /// Light that is on ends and is recorded.
   ~WireCell();
@@ -26,7 +26,7 @@ class WireCell {
   double now_s() const;
   /// Called on the serving thread (or that of act()), which waits for it.
   void set_emission_sink(EmissionSink sink);
-  /// Acts on the cell at its present time: an operator at the key switch, a hand in the interlock, a look at the axes.
+  /// Acts on the cell at its present time: a turn of the key switch, an open interlock, a reading of the axes.
   void act(const std::function<void(TrueCell&)>& action);
   void add_fault(const WireFault& fault);
   /// Ends all faults, also those that have not begun.

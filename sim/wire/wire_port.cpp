@@ -74,7 +74,7 @@ PseudoTerminal::PseudoTerminal() : master(::posix_openpt(O_RDWR | O_NOCTTY | O_N
 
 void Connection::read() {
   std::array<char, 4096> buffer;
-  // A caller who sends without end must not keep the others waiting.
+  // A client that sends without end must not delay the others.
   constexpr int kReadsMax = 4;
   for (int i = 0; i < kReadsMax; ++i) {
     const ssize_t count = ::read(fd_.get(), buffer.data(), buffer.size());

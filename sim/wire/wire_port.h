@@ -30,7 +30,7 @@ class ListeningPort {
   ListeningPort();
   std::uint16_t port() const { return port_; }
   int fd() const { return fd_.get(); }
-  /// The next caller, or a closed descriptor.
+  /// The next client's connection, or a closed descriptor.
   Descriptor accept() const;
 
  private:
@@ -38,7 +38,8 @@ class ListeningPort {
   std::uint16_t port_ = 0;
 };
 
-/// A pseudo-terminal in raw mode: we hold the master; the slave stays open, so that nobody's closing it hangs it up.
+/// A pseudo-terminal in raw mode: we hold the master; the slave stays open, so that a client that closes it does not
+/// hang it up.
 struct PseudoTerminal {
   PseudoTerminal();
   Descriptor master, slave;

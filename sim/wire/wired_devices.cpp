@@ -38,7 +38,7 @@ WiredDevices::WiredDevices(const CellDescription& description, const WireOptions
   for (const WireFault& fault : options.faults) faults_.add(fault);  // some begin at once
 }
 
-void WiredDevices::look() {
+void WiredDevices::observe() {
   robot_.run();
   faults_.observe();
 }
@@ -48,10 +48,10 @@ void WiredDevices::advance(double now_s) {
     const double event_s = next_event_s();
     if (!(event_s <= now_s)) break;
     cell_.advance(event_s);
-    look();
+    observe();
   }
   cell_.advance(now_s);
-  look();
+  observe();
 }
 
 double WiredDevices::next_event_s() const {

@@ -7,18 +7,18 @@
 #include "sim/wire/modbus_server.h"
 #include "sim/wire/wire_options.h"
 
-/// The devices of the simulated cell with all that they share, without sockets and without a clock: whoever has bytes
-/// makes sessions, whoever has a clock says what time it is. One thread.
+/// The devices of the simulated cell with all that they share, without sockets and without a clock: the owner makes
+/// sessions for its connections and passes the time. One thread.
 namespace hilbrush {
 
 class WiredDevices {
  public:
   WiredDevices(const CellDescription& description, const WireOptions& options);
 
-  /// Every event at its own time, up to now_s: who looks late changes no pulse.
+  /// Every event at its own time, up to now_s: a late call changes no pulse.
   void advance(double now_s);
   /// After something was done to the cell from outside: lets the devices see it.
-  void look();
+  void observe();
   /// The next instant at which something happens by itself (what sessions have to send is theirs).
   double next_event_s() const;
 

@@ -269,7 +269,7 @@ TEST(SimCell, MovingOffDuringAPulseIsOnRecord) {
   ready.cell.table.move_to({.2, 0}, kSettle);
   ready.wait_for(.1);
   EXPECT_TRUE(ready.cell.laser.off());
-  // A pulse that has ended by itself before the move is clean, though nobody looked in between.
+  // A pulse that has ended by itself before the move is clean, though its status was not read in between.
   ready.wait_for(1);
   ready.cell.laser.fire(1, .05);
   ready.wait_for(.06);

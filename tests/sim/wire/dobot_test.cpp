@@ -99,7 +99,7 @@ TEST_F(DobotTest, FramesComeEveryEightMilliseconds) {
 TEST_F(DobotTest, OnWaitOffIsAPulseThatTheControllerTimesItself) {
   EXPECT_EQ(move("DO(1,1)wait(5)DO(1,0)Sync()"), "0,{},DO(1,1);0,{},wait(5);0,{},DO(1,0);");
   EXPECT_EQ(value_at<std::uint64_t>(frame(), 16) & 1, 0u) << "over within the first frame";
-  world.pass(10);  // nobody is there any more
+  world.pass(10);  // the client has disconnected
   ASSERT_EQ(world.emissions.size(), 1u);
   EXPECT_EQ(world.emissions[0].length_s, .005);
   EXPECT_EQ(world.emissions[0].commanded_s, .005);

@@ -197,7 +197,7 @@ TEST(CellFaultTest, AxesJamAndDriftAndLimitsComeDown) {
   stuck.trigger.delay_s = .1;
   world.devices.faults().add(stuck);
   cell.move_axis(kRotation, 2);
-  world.devices.look();
+  world.devices.observe();
   world.pass(.9);
   const double here = cell.position(kRotation);
   EXPECT_LT(here, 1);

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <random>
@@ -141,16 +142,14 @@ class Cia402Test : public testing::Test {
     return options;
   }
   unsigned read(unsigned index) {
-    char request[40];
-    std::snprintf(request, sizeof request, "01 03 %02X %02X 00 01", index >> 8, index & 0xff);
+    const std::string request = fmt::format("01 03 {:02X} {:02X} 00 01", index >> 8, index & 0xff);
     const std::string reply = from_hex(body(world.ask(*line, with_crc(request))));
     return reply.size() == 5
                ? static_cast<unsigned>(static_cast<unsigned char>(reply[3]) << 8 | static_cast<unsigned char>(reply[4]))
                : 0xFFFFF;
   }
   void control(unsigned word) {
-    char request[40];
-    std::snprintf(request, sizeof request, "01 06 60 40 %02X %02X", word >> 8, word & 0xff);
+    const std::string request = fmt::format("01 06 60 40 {:02X} {:02X}", word >> 8, word & 0xff);
     EXPECT_EQ(body(world.ask(*line, with_crc(request))), request);
   }
   WireWorld world{options()};

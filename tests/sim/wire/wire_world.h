@@ -1,4 +1,6 @@
 #pragma once
+#include <fmt/format.h>
+
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,7 +30,7 @@ class WireWorld {
   /// What a session says to bytes that arrive now.
   std::string ask(WireSession& session, const std::string& bytes) {
     session.receive(bytes);
-    devices.look();
+    devices.observe();
     session.run();
     return session.take_output();
   }
@@ -63,11 +65,7 @@ inline std::string with_crc(const std::string& hex) {
 
 inline std::string to_hex(const std::string& bytes) {
   std::string text;
-  for (const char c : bytes) {
-    char digits[4];
-    std::snprintf(digits, sizeof digits, "%02X", static_cast<unsigned>(static_cast<unsigned char>(c)));
-    text += (text.empty() ? "" : " ") + std::string(digits);
-  }
+  for (const char c : bytes) text += fmt::format("{}{:02X}", text.empty() ? "" : " ", static_cast<unsigned char>(c));
   return text;
 }
 
