@@ -48,9 +48,9 @@ class CampaignWorld {
   virtual void add(const WireFault& fault) = 0;
   virtual bool is_emitting() = 0;
   virtual std::uint64_t faults_begun() = 0;
-  /// Calls `stop` once, so many cell seconds from now, from wherever time passes.
+  /// Calls `stop` once, this many cell seconds from now, on the thread that lets time pass.
   virtual void stop_later(double after_s, std::function<void()> stop) = 0;
-  /// Whatever stop_later() was told has been called, or never will be.
+  /// What stop_later() was given has been called, or never will be.
   virtual void forget_stop() = 0;
   /// How long a case may take, in cell seconds: twelve dots take two; faults and patience the rest.
   virtual double patience_s() const = 0;

@@ -1,6 +1,6 @@
 #include "tests/cell/fault_plan.h"
 
-#include <cstdio>
+#include <fmt/format.h>
 
 namespace hilbrush::test {
 
@@ -33,15 +33,12 @@ WireFault in_wall_time(WireFault fault, double time_scale) {
 }
 
 std::string described(const WireFault& fault) {
-  char text[200];
-  std::snprintf(text, sizeof text, "%s of %s (axis %s, amount %.3g), %.2f ms into %s %llu, %llu messages, %.1f ms",
-                kWireFaultNames[static_cast<std::size_t>(fault.kind)],
-                kWireDeviceNames[static_cast<std::size_t>(fault.device)],
-                kAxisNames[static_cast<std::size_t>(fault.axis)], fault.amount, fault.trigger.delay_s * 1e3,
-                fault.trigger.phase ? kCellPhaseNames[static_cast<std::size_t>(*fault.trigger.phase)] : "none",
-                static_cast<unsigned long long>(fault.trigger.occurrence),
-                static_cast<unsigned long long>(fault.messages), fault.duration_s * 1e3);
-  return text;
+  return fmt::format("{} of {} (axis {}, amount {:.3g}), {:.2f} ms into {} {}, {} messages, {:.1f} ms",
+                     kWireFaultNames[static_cast<std::size_t>(fault.kind)],
+                     kWireDeviceNames[static_cast<std::size_t>(fault.device)], kAxisNames[fault.axis], fault.amount,
+                     fault.trigger.delay_s * 1e3,
+                     fault.trigger.phase ? kCellPhaseNames[static_cast<std::size_t>(*fault.trigger.phase)] : "none",
+                     fault.trigger.occurrence, fault.messages, fault.duration_s * 1e3);
 }
 
 }  // namespace hilbrush::test

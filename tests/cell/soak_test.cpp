@@ -12,7 +12,7 @@
 
 /// The daemon with its real drivers on wires, for long: jobs, faults of every kind, connections that are lost and made
 /// again, stops, the daemon's own restarts, clients that mean no good. HILBRUSH_LONG=1 makes it an hour,
-/// HILBRUSH_SOAK_S=N so many seconds.
+/// HILBRUSH_SOAK_S=N makes it N seconds.
 namespace hilbrush {
 namespace {
 

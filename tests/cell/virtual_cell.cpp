@@ -1,8 +1,9 @@
 #include "tests/cell/virtual_cell.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <numbers>
 
@@ -14,9 +15,7 @@ namespace {
 constexpr double kWindow = 5e-5;  ///< rad, m
 
 std::string printed(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6f", value);
-  return text;
+  return fmt::format("{:.6f}", value);
 }
 double wire_unit(std::size_t axis) {
   return axis == kJ3 ? 1e-3 : std::numbers::pi / 180;
@@ -49,11 +48,11 @@ void VirtualLink::exchange(const std::function<bool()>& act) {
   if (clock_.on_time) clock_.on_time();
   const auto obey = [&] {
     const bool is_done = act();
-    devices_.look();
+    devices_.observe();
     return is_done;
   };
   if (devices_.faults().is_line_down(device_)) {
-    devices_.advance(clock_.now_s() + kPatienceS);
+    devices_.advance(clock_.now_s() + kReplyTimeoutS);
     lose("does not answer");
   }
   const auto fault = devices_.faults().on_message(device_);
@@ -66,23 +65,23 @@ void VirtualLink::exchange(const std::function<bool()>& act) {
       obey();
       [[fallthrough]];
     case WireFaultKind::kLostRequest:
-      devices_.advance(clock_.now_s() + kPatienceS);
+      devices_.advance(clock_.now_s() + kReplyTimeoutS);
       lose("does not answer");
     case WireFaultKind::kHalfFrame:
       obey();
-      devices_.advance(clock_.now_s() + kPatienceS);
+      devices_.advance(clock_.now_s() + kReplyTimeoutS);
       lose("answers in halves");
     case WireFaultKind::kWrongId:
     case WireFaultKind::kWrongChecksum:
       obey();
-      lose("answers what nobody asked");
+      lose("sent an answer to no command");
     case WireFaultKind::kDroppedConnection:
       devices_.faults().set_line_down(device_, fault->duration_s);
       lose("closed the connection");
     case WireFaultKind::kLateAnswer:
       obey();
-      devices_.advance(clock_.now_s() + std::min(fault->duration_s, kPatienceS));
-      if (fault->duration_s > kPatienceS) lose("does not answer");
+      devices_.advance(clock_.now_s() + std::min(fault->duration_s, kReplyTimeoutS));
+      if (fault->duration_s > kReplyTimeoutS) lose("does not answer");
       return;
     default:
       throw DriverError(name + " refuses");
@@ -126,7 +125,7 @@ void VirtualAxes<N>::move_to(const Positions& target, double settle_s) {
 
 template <std::size_t N>
 typename VirtualAxes<N>::Status VirtualAxes<N>::status() {
-  if (state_ != DeviceState::kDisconnected && !link_.is_lost()) look();
+  if (state_ != DeviceState::kDisconnected && !link_.is_lost()) read_state();
   fault_if_lost();
   judge();
   const double now_s = clock_.now_s();
@@ -172,7 +171,7 @@ void VirtualRobot::command(bool is_motion, const std::string& name, const std::v
 }
 
 /// A frame, as it comes every 8 ms without being asked.
-void VirtualRobot::look() {
+void VirtualRobot::read_state() {
   try {
     link_.exchange([&] {
       const std::string frame = devices_.robot().frame();
@@ -201,7 +200,7 @@ void VirtualRobot::enable() {
   command(false, "enablerobot", {});
   clock_.sleep_until(clock_.now_s() + .3);
   command(false, "resetrobot", {});
-  look();
+  read_state();
   if (mode_ != 5) throw DriverError("the robot is not enabled");
   state_ = DeviceState::kEnabled;
 }
@@ -259,13 +258,13 @@ bool VirtualRobot::gate_off() noexcept {
 }
 
 bool VirtualRobot::is_gate_on() {
-  if (!link_.is_lost()) look();
+  if (!link_.is_lost()) read_state();
   return is_output_on_;
 }
 
 // ---- table
 
-void VirtualTable::look() {
+void VirtualTable::read_state() {
   try {
     link_.exchange([&] {
       is_reported_there_ = true;

@@ -6,9 +6,9 @@
 #include "sim/wire/wired_devices.h"
 
 /// The devices of the simulated cell, with all their faults, behind the drivers' interfaces without any wire between:
-/// under virtual time, in which thousands of jobs with faults take seconds. What stands for the drivers here is as
-/// careful as they have to be, and no more: it believes a device that says it is in position where it was sent, for as
-/// long as it was told; an exchange that fails leaves the link lost.
+/// under virtual time, in which thousands of jobs with faults take seconds. These replacements of the drivers are only
+/// as careful as drivers must be: they believe a device that reports "in position" at its target for the settle time;
+/// an exchange that fails leaves the link lost.
 namespace hilbrush::test {
 
 class VirtualClock final : public Clock {
@@ -17,7 +17,7 @@ class VirtualClock final : public Clock {
   double now_s() const override { return devices_.cell().now_s(); }
   void sleep_until(double time_s) override;
   void wake() override {}
-  /// Called once for each exchange and sleep: for whoever acts at a moment (an operator's stop).
+  /// Called once for each exchange and sleep: for actions at a chosen moment (an operator's stop).
   std::function<void()> on_time;
 
  private:
@@ -36,7 +36,8 @@ class VirtualLink {
   void connect() { lost_.clear(); }
 
  private:
-  static constexpr double kExchangeS = 2e-4, kPatienceS = .1;
+  static constexpr double kExchangeS = 2e-4;
+  static constexpr double kReplyTimeoutS = .1;
   [[noreturn]] void lose(const std::string& how);
   const WireDevice device_;
   WiredDevices& devices_;
@@ -77,7 +78,7 @@ class VirtualAxes : public AxisGroup<N>, protected VirtualDevice {
 
  protected:
   /// Reads where the axes are, and what the device says of itself; a reading that fails is one less.
-  virtual void look() = 0;
+  virtual void read_state() = 0;
   virtual void order_move(const Positions& target) = 0;
   virtual void order_stop() = 0;
   /// Whether the device, as last seen, says that nothing moves.
@@ -107,7 +108,7 @@ class VirtualRobot final : public VirtualAxes<4> {
 
  private:
   void command(bool is_motion, const std::string& name, const std::vector<std::string>& arguments);
-  void look() override;
+  void read_state() override;
   void order_move(const Positions& target) override;
   void order_stop() override { command(false, "resetrobot", {}); }
   bool is_at_rest() const override;
@@ -124,7 +125,7 @@ class VirtualTable final : public VirtualAxes<2> {
   void clear_fault() override;
 
  private:
-  void look() override;
+  void read_state() override;
   void order_move(const Positions& target) override;
   void order_stop() override;
   bool is_at_rest() const override { return is_reported_there_; }

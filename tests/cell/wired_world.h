@@ -17,7 +17,7 @@ namespace hilbrush::test {
 
 class WiredWorld {
  public:
-  /// kNone: somebody else drives the devices, by the cell file.
+  /// kNone: the test drives the devices itself, by the cell file.
   enum class Drivers { kHere, kNone };
   /// The shipped cell on wires. @throws what the wire or the drivers throw
   explicit WiredWorld(const WireOptions& options, Drivers drivers = Drivers::kHere);
