@@ -2,8 +2,8 @@
 // seconds, patches, path constants, the worst mass of a stratum, memory, and an answer hash, which is the same for any
 // number of threads.
 //   curve_bench MODEL [TRIANGLES=268000] [TEXELS=2048] [MOST_DOTS=10000000] [STREAMED_DOTS FILE]
-//   curve_bench --leaves FILE.png     where the patches of a line drawing go, against all of them at the finest depth
-// STREAMED_DOTS go to FILE as binary PLY. Without textures of its own the model wears a picture of waves and lines, by
+//   curve_bench --leaves FILE.png     patches on a line drawing, beside all of them at the finest depth
+// STREAMED_DOTS are written to FILE as binary PLY. A model without textures gets a picture of waves and lines by
 // projection.
 #include <tbb/global_control.h>
 
@@ -32,7 +32,7 @@ namespace {
 using namespace hilbrush;
 
 constexpr int kRepeats = 3;
-/// Strata are measured again one by one up to so many.
+/// Up to this many strata are measured again one by one.
 constexpr std::uint64_t kMaxChecked = 100'000;
 
 struct Seconds {
@@ -53,7 +53,7 @@ Seconds time(int repeats, Work work) {
   return best;
 }
 
-/// Most memory so far, in MB; reset_peak() begins anew.
+/// Largest resident memory in MB since the start or the last reset_peak().
 double peak_mb() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)
@@ -157,15 +157,10 @@ void measure(const char* title, const SurfaceCurve& curve, const ToneOptions& to
   }
 }
 
-void run(int argc, char** argv) {
-  const std::size_t triangles = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 268'000;
-  const int texels = argc > 3 ? std::atoi(argv[3]) : 2048;
-  const std::uint64_t most_dots = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 10'000'000;
-  const TexturedMesh mesh = load(argv[1], triangles);
-  const double mesh_mb = peak_mb();
-  const Seconds map = time(1, [&] { SurfaceCurve{mesh}; });
-  const SurfaceCurve curve(mesh);
-  std::size_t quads = 0, listed = 0;
+/// Builds the base trees again, and prints the times of map and trees and their sizes.
+void print_tree(const TexturedMesh& mesh, const SurfaceCurve& curve, const Seconds& map, double mesh_mb) {
+  std::size_t quads = 0;
+  std::size_t listed = 0;
   Seconds tree;
   for (const Chart& chart : curve.charts()) {
     Chart again = chart;
@@ -182,6 +177,33 @@ void run(int argc, char** argv) {
       mesh.triangle_count(), curve.components().size(), map.cpu, map.wall, tree.cpu);
   std::printf("base tree: %zu quads, %.2f quads a triangle; memory %.0f MB for the mesh, %.0f MB at most so far\n",
               quads, static_cast<double>(listed) / static_cast<double>(mesh.triangle_count()), mesh_mb, peak_mb());
+}
+
+/// Streams dots into a file and prints the time and the memory that it takes.
+void stream_to_file(const CurveMass& mass, std::uint64_t count, const char* file_name) {
+  reset_peak();
+  const double before_mb = peak_mb();
+  SampleOptions options;
+  options.dot_count = count;
+  options.dot_limit = count;
+  const Seconds s = time(1, [&] {
+    DotsFile file(file_name, pitch_of(mass, options, count), count, {});
+    stream_dots(mass, options, [&](std::span<const Dot> dots) { file.add(dots); });
+    file.close();
+  });
+  std::printf("\n%llu dots streamed to %s: %.2f s CPU, %.2f s wall; %.0f MB before, %.0f MB at most\n",
+              static_cast<unsigned long long>(count), file_name, s.cpu, s.wall, before_mb, peak_mb());
+}
+
+void run(int argc, char** argv) {
+  const std::size_t triangles = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 268'000;
+  const int texels = argc > 3 ? std::atoi(argv[3]) : 2048;
+  const std::uint64_t most_dots = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 10'000'000;
+  const TexturedMesh mesh = load(argv[1], triangles);
+  const double mesh_mb = peak_mb();
+  const Seconds map = time(1, [&] { SurfaceCurve{mesh}; });
+  const SurfaceCurve curve(mesh);
+  print_tree(mesh, curve, map, mesh_mb);
   ToneOptions material;
   material.untextured = Untextured::kMaterial;
   for (const std::size_t threads : {1, 2}) measure("constant tone", curve, material, most_dots, threads);
@@ -192,18 +214,7 @@ void run(int argc, char** argv) {
 
   const ToneField tone(painted, {});
   const CurveMass mass(painted_curve, tone);
-  reset_peak();
-  const double before_mb = peak_mb();
-  SampleOptions options;
-  options.dot_count = std::strtoull(argv[5], nullptr, 10);
-  options.dot_limit = *options.dot_count;
-  const Seconds s = time(1, [&] {
-    DotsFile file(argv[6], pitch_of(mass, options, *options.dot_count), *options.dot_count, {});
-    stream_dots(mass, options, [&](std::span<const Dot> dots) { file.add(dots); });
-    file.close();
-  });
-  std::printf("\n%llu dots streamed to %s: %.2f s CPU, %.2f s wall; %.0f MB before, %.0f MB at most\n",
-              static_cast<unsigned long long>(*options.dot_count), argv[6], s.cpu, s.wall, before_mb, peak_mb());
+  stream_to_file(mass, std::strtoull(argv[5], nullptr, 10), argv[6]);
 }
 
 /// Large flat areas and fine lines on a plate.
@@ -233,14 +244,17 @@ Picture leaf_picture(const CurveMass& mass, const TexturedMesh& mesh, const Patc
     const auto i = static_cast<std::size_t>(std::clamp(x / .05 * n, 0., n - 1));
     const auto j = static_cast<std::size_t>(std::clamp((1 - y / .05) * n, 0., n - 1));
     std::uint8_t* pixel = &picture.pixels[3 * (j * static_cast<std::size_t>(texture.width) + i)];
-    pixel[0] = 200, pixel[1] = 30, pixel[2] = 30;
+    pixel[0] = 200;
+    pixel[1] = 30;
+    pixel[2] = 30;
   };
   visit_patches(mass, rule, [&](const Patch& patch) {
     Eigen::Vector3d low = Eigen::Vector3d::Constant(1), high = -low;
     for (const PatchPiece& piece : patch.pieces)
       for (const Eigen::Vector2d& b : piece.corners_b) {
         const Eigen::Vector3d p = position(mesh, {piece.triangle, {1 - b.sum(), b.x(), b.y()}});
-        low = low.cwiseMin(p), high = high.cwiseMax(p);
+        low = low.cwiseMin(p);
+        high = high.cwiseMax(p);
       }
     for (double x = low.x(); x < high.x(); x += .05 / n) mark(x, low.y());
     for (double y = low.y(); y < high.y(); y += .05 / n) mark(low.x(), y);

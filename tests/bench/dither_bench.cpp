@@ -61,10 +61,10 @@ class Print {
     std::vector<double> painted(wanted_blurred_.size(), 0);
     const double step = step_m(), peak = pitch_ * pitch_ / (2 * std::numbers::pi * pitch_ * pitch_);
     for (const Vector2d& p : points) {
-      const int x0 = std::max(0, static_cast<int>((p.x() - kCut * pitch_) / step)),
-                x1 = std::min(columns_ - 1, static_cast<int>((p.x() + kCut * pitch_) / step)),
-                y0 = std::max(0, static_cast<int>((p.y() - kCut * pitch_) / step)),
-                y1 = std::min(rows_ - 1, static_cast<int>((p.y() + kCut * pitch_) / step));
+      const int x0 = std::max(0, static_cast<int>((p.x() - kCut * pitch_) / step));
+      const int x1 = std::min(columns_ - 1, static_cast<int>((p.x() + kCut * pitch_) / step));
+      const int y0 = std::max(0, static_cast<int>((p.y() - kCut * pitch_) / step));
+      const int y1 = std::min(rows_ - 1, static_cast<int>((p.y() + kCut * pitch_) / step));
       for (int y = y0; y <= y1; ++y)
         for (int x = x0; x <= x1; ++x)
           painted[static_cast<std::size_t>(y) * columns_ + x] +=
@@ -87,7 +87,8 @@ class Print {
   static TexturedMesh textured_rectangle(const Original& picture) {
     TexturedMesh mesh = test::rectangle(1, static_cast<double>(picture.height) / picture.width, 1, 1);
     Texture texture;
-    texture.width = picture.width, texture.height = picture.height;
+    texture.width = picture.width;
+    texture.height = picture.height;
     for (const float coverage : picture.coverage) texture.luminance.push_back(1 - coverage);
     texture.name = picture.name;
     mesh.textures.push_back(texture);
@@ -108,9 +109,10 @@ class Print {
   double step_m() const { return pitch_ / 2; }
   Vector2d place(int x, int y) const { return {(x + .5) * step_m(), (y + .5) * step_m()}; }
 
-  /// The wanted picture at half a pitch, each value the mean of 4 x 4 looks, blurred along rows and then columns.
+  /// The wanted picture at half a pitch, each value the mean of 4 x 4 samples, blurred along rows and then columns.
   void blur_wanted() {
-    columns_ = static_cast<int>(width_ / step_m()), rows_ = static_cast<int>(height_ / step_m());
+    columns_ = static_cast<int>(width_ / step_m());
+    rows_ = static_cast<int>(height_ / step_m());
     std::vector<double> image(static_cast<std::size_t>(columns_) * rows_);
     for (int y = 0; y < rows_; ++y)
       for (int x = 0; x < columns_; ++x)

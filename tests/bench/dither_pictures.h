@@ -13,7 +13,7 @@
 #include "sampling/base/random.h"
 #include "sampling/images/image_file.h"
 
-/// Pictures that dithering is tried on: wanted coverage, 0 white to 1 black, in linear light.
+/// Pictures for dithering: wanted coverage, 0 white to 1 black, in linear light.
 namespace hilbrush::bench {
 
 struct Original {
@@ -37,7 +37,7 @@ inline Original ramp() {
   return picture_of("ramp", 512, 384, [](double u, double) { return u; });
 }
 
-/// Rings that get finer outwards, to 12 pixels a period.
+/// Rings that get finer outwards, down to 12 pixels a period.
 inline Original zone_plate() {
   return picture_of("zone plate", 512, 384, [](double u, double v) {
     const double x = 512 * u, y = 384 * v, r2 = x * x + y * y;
@@ -59,7 +59,7 @@ inline double smooth_noise(double x, double y) {
          g * ((1 - f) * lattice_number(i, j + 1) + f * lattice_number(i + 1, j + 1));
 }
 
-/// Like a photograph: 1/f texture all over, and lit balls with highlights and sharp outlines in front of it.
+/// Like a photograph: 1/f texture everywhere, and lit balls with highlights and sharp outlines in front of it.
 inline Original still_life() {
   return picture_of("still life", 640, 480, [](double u, double v) {
     const double x = 4 * u, y = 3 * v;

@@ -1,5 +1,5 @@
 // What `fine` gains over `centroid` on the simulated film, at normal incidence and everywhere, for several numbers of
-// passes: fidelity, CPU seconds, path and how far dots went.
+// passes: fidelity, CPU seconds, path and how far dots moved.
 //   fine_bench MODEL SIZE_MM DPI [PASSES...]
 #include <algorithm>
 #include <cstdio>

@@ -45,9 +45,8 @@ class Stages {
   std::map<std::string, double> now_, best_;
 };
 
-std::optional<Texture> no_image(const std::filesystem::path&, std::size_t, std::string& reason) {
-  reason = "not needed";
-  return std::nullopt;
+Result<Texture> no_image(const std::filesystem::path&, std::size_t) {
+  return Failure{"not needed"};
 }
 
 TexturedMesh read(const char* file, std::size_t triangles) {

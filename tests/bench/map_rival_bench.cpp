@@ -29,9 +29,8 @@ namespace parameterization = CGAL::Surface_mesh_parameterization;
 using RivalMesh = CGAL::Surface_mesh<CGAL::Simple_cartesian<double>::Point_3>;
 
 TexturedMesh read(const char* file, std::size_t triangles) {
-  const auto no_image = [](const std::filesystem::path&, std::size_t, std::string& reason) {
-    reason = "not needed";
-    return std::optional<Texture>();
+  const auto no_image = [](const std::filesystem::path&, std::size_t) -> Result<Texture> {
+    return Failure{"not needed"};
   };
   PlacementOptions placement;
   placement.size_m = .08;

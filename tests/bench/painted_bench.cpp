@@ -1,11 +1,11 @@
-// The painted figures: how well the picture on an object comes out, as films with F1 and F2.
+// Painted pictures: the fidelity F1 and F2 of simulated films.
 //
-//   painted_bench table MODEL SIZE_MM DPI...           the fidelity of each way to place dots
-//   painted_bench figures EGGCUP FOLDER                 the thesis's figures 7.11, 7.13 to 7.16: laminar slices beside
-//   ours painted_bench run MODEL SIZE_MM DPI [loop|plain]    one run, with its time and memory
+//   painted_bench table MODEL SIZE_MM DPI...                 the fidelity of each method of placing dots
+//   painted_bench figures EGGCUP FOLDER                      figures 7.11 and 7.13 to 7.16 of the thesis: laminar
+//                                                            slices beside our dots
+//   painted_bench run MODEL SIZE_MM DPI [loop|plain]         one run, with its time and memory
 //
-// Dots are exposed at normal incidence by a perfect cell; what the cell adds is in the dry runs of RESULTS.md.
-
+// Dots are exposed at normal incidence by a perfect cell; RESULTS.md has dry runs with the default cell.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -34,7 +34,7 @@ namespace {
 
 using namespace hilbrush;
 
-/// A way to place dots, by the settings a job would have.
+/// A method of placing dots, as settings of a job.
 struct Way {
   const char* name;
   const char* settings;
@@ -48,7 +48,7 @@ constexpr std::array kWays{Way{"random", R"({"sampler":"random"})"},
                            Way{"three levels", R"({"levels":3})"},
                            Way{"laminar", R"({"curve":"laminar"})"}};
 
-/// A mesh with its curve and cell; `place` is what a job's pipeline does.
+/// A mesh with its curve and cell; `place` does the same as a job's pipeline.
 class Workpiece {
  public:
   Workpiece(TexturedMesh mesh, CellDescription cell) : mesh_(std::move(mesh)), cell_(std::move(cell)), curve_(mesh_) {}

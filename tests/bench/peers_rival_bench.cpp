@@ -52,7 +52,7 @@ double run_ours(const char* name, Sampler sampler, std::uint64_t count, const Su
   return best;
 }
 
-/// Open3D is handed vertices and triangles, and gives points without their triangles.
+/// Open3D gets vertices and triangles; its points come without their triangles.
 double run_open3d(std::uint64_t count, const TexturedMesh& mesh, const SurfaceQuality& quality) {
   open3d::geometry::TriangleMesh theirs;
   theirs.vertices_.assign(mesh.vertices.begin(), mesh.vertices.end());

@@ -1,5 +1,5 @@
-// Times the way from a model to a checked program, stage by stage, and prints an answer hash: same input, same hash, on
-// any machine and thread count.
+// Times the stages from a model to a checked program and prints a hash of the answer, which is the same for any number
+// of threads.
 //   pipeline_bench MODEL SIZE_MM DPI [REPEATS]
 #include <algorithm>
 #include <chrono>

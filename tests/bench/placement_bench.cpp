@@ -1,7 +1,7 @@
-// How much better `centroid` and `blue` place dots than the thesis's `jittered`, in the plane and on meshes, against
-// the limits that are set for them.
+// The quality of `centroid` and `blue` beside the thesis's `jittered`, in the plane and on meshes, and the limits set
+// for them.
 //   placement_bench [--count N] [--shapes L] [--seeds S] [MESH...]
-// On a plate (the unit square), on a sphere of 8,000 triangles, and on each mesh, black all over. Lengths are over
+// On a plate (the unit square), on a sphere of 8,000 triangles, and on each mesh, all black. Lengths are over
 // sqrt(A / N); power is the mean below half the principal frequency. Ratios are to jittered on the same surface with
 // the same test shapes. One set's anisotropy scatters, so its mean over S seeds is given too. A hash of all figures is
 // printed at the end.

@@ -1,12 +1,13 @@
-// Painting time, incidence and planning cost of the baselines and of every way of planning, on the same dots' counts,
-// by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program passes the same check.
+// Painting time, incidence and planning cost of the baselines and of every planning mode, for the same number of dots
+// and by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program passes the same
+// check.
 //   plan_bench [--confirm N] MODEL SIZE_MM DOTS [ROW...]
-//       rows: laminar space curve thesis fast balanced quality; all unless named. Of the skipped dots of each row, N
-//       are looked for by brute force over a grid of poses one degree apart.
+//       rows: laminar space curve thesis fast balanced quality; all unless named. N of
+//       the skipped dots of each row are tried by brute force on a grid of poses one degree apart.
 //   plan_bench --trade MODEL SIZE_MM DOTS
 //       painting time over incidence, by preferred incidence and planning
-// Floor: the seconds that no order and no poses can beat, because each exposure takes the shortest settling, its pulse
-// and a move of one control tick. The shares of steps that take one, two, more ticks say what is above it.
+// Floor: the least possible painting time, as each exposure takes the shortest settling, its pulse and a move of one
+// control tick. The shares of steps that take one, two or more ticks show what exceeds it.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -119,7 +120,7 @@ struct Bench {
   void run(const Row& row, std::uint64_t count) const;
   void explain_skipped(const Plan& plan, const DotSequence& dots, const Reach& reach) const;
 
-  std::size_t confirmed_by_brute_force = 0;  ///< so many of the skipped dots
+  std::size_t confirmed_by_brute_force = 0;  ///< of the skipped dots
   CellDescription cell;
   TexturedMesh mesh;
   SurfaceCurve curve;

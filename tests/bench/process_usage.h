@@ -1,7 +1,7 @@
 #pragma once
 #include <sys/resource.h>
 
-/// What this process has used so far.
+/// Time and memory that this process has used so far.
 namespace hilbrush {
 
 /// CPU seconds of all its threads.
@@ -12,7 +12,7 @@ inline double cpu_s() {
          1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-/// The most memory it ever had, in megabytes.
+/// Its largest resident memory, in megabytes.
 inline double peak_mb() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);

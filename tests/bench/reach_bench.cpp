@@ -1,10 +1,10 @@
 // How fast poses are solved and tested for clearance, how well the distance field agrees with rays, and whether dots
 // that are out of reach really are.
 //   reach_bench [--poses N] [--dots N] [--brute N] MODEL SIZE_MM [MODEL SIZE_MM...]
-// For each model: solutions of the whole chain a second; poses a second with everything looked at (beam, lens, joints,
-// quill, links), each by itself, and along directions as reach goes; the field against a bundle of rays; the share of
-// N dots all over the surface that is reached; and of N skipped dots, how many a fine grid of poses reaches after all.
-// CPU seconds of one thread. A hash of all counts is printed at the end.
+// For each model: solutions of the whole chain per second; poses per second with everything checked (beam, lens,
+// joints, quill, links), each by itself, and along directions as `Reach` searches; the distance field against a bundle
+// of rays; the share of N dots everywhere on the surface that is reached; and how many of N skipped dots a fine grid of
+// poses reaches after all. CPU seconds of one thread. A hash of all counts is printed at the end.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -42,7 +42,7 @@ double seconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// Places all over the surface, by area.
+/// Random places on the surface, by area.
 std::vector<Target> scatter_targets(const TexturedMesh& mesh, std::size_t count, std::mt19937& random) {
   std::vector<double> sums;
   double sum = 0;
@@ -54,7 +54,10 @@ std::vector<Target> scatter_targets(const TexturedMesh& mesh, std::size_t count,
     const auto t = std::min<std::size_t>(
         static_cast<std::size_t>(std::lower_bound(sums.begin(), sums.end(), at) - sums.begin()), sums.size() - 1);
     double v = uniform(random), w = uniform(random);
-    if (v + w > 1) v = 1 - v, w = 1 - w;
+    if (v + w > 1) {
+      v = 1 - v;
+      w = 1 - w;
+    }
     const Vector3d p = (1 - v - w) * mesh.corner(t, 0) + v * mesh.corner(t, 1) + w * mesh.corner(t, 2);
     const Vector3d normal = mesh.area_vector(t).normalized();
     targets.push_back({p, normal, normal});

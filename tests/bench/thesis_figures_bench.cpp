@@ -64,7 +64,7 @@ void figure_5_13(const Output& output) {
   output.write("figure_5_13.svg", svg_of(pictures, "3,000 points in the unit square"));
 }
 
-/// A surface of table 5.5 and how it is looked at.
+/// A surface of table 5.5 and the direction of view.
 struct View {
   ParametricShape shape;
   const char *name, *file;
@@ -77,7 +77,8 @@ struct View {
 class SurfaceFigure {
  public:
   explicit SurfaceFigure(const View& view) : view_(view), surface_(make_surface(view.shape)) {
-    const double turn = view.turn_deg * EIGEN_PI / 180, height = view.height_deg * EIGEN_PI / 180;
+    const auto turn = static_cast<double>(view.turn_deg * EIGEN_PI / 180);
+    const auto height = static_cast<double>(view.height_deg * EIGEN_PI / 180);
     eye_ = {std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn), std::sin(height)};
   }
 

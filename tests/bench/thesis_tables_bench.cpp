@@ -1,9 +1,9 @@
 // The thesis's discrepancy slopes beside our own: tables 5.1, 5.2, 5.3, 5.4 and, with meshes given, 6.1.
 //   thesis_tables_bench [--powers L] [--out FOLDER] [MESH...]
 // Sets of 2^l and 2^l + 2^(l-1) points, l = 1..L (default 20: up to 1,572,864), 1000 test shapes each, as
-// sections 5.1.1 and 6.2.1 say. The thesis's slopes are of the largest error; those of the rms error are steadier and
-// stand beside them. Prints a hash of all figures at the end. With --out, plots of all sets (figures 5.2 to 5.7, 5.9
-// to 5.12 and 6.5) go into the folder.
+// sections 5.1.1 and 6.2.1 say. The thesis's slopes are of the largest error; those of the rms error, which are
+// steadier, are printed beside them. Prints a hash of all figures at the end. With --out, plots of all sets
+// (figures 5.2 to 5.7, 5.9 to 5.12 and 6.5) are written into the folder.
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -82,14 +82,14 @@ void print_and_plot(Run& run, const std::string& title, const std::string& file,
   if (!run.out.empty()) write_svg(svg_of(plot), run.out / file);
 }
 
-/// A way to make point sets in the plane, and the thesis's slopes by rectangles, quarter circles, triangles.
+/// A method of making point sets in the plane, and the thesis's slopes by rectangles, quarter circles, triangles.
 struct PlaneMethod {
   std::string name;
   std::function<std::vector<Vector2d>(std::uint64_t count)> make;
   std::array<double, 3> of_thesis{};
 };
 
-/// Dots on a surface by one way to make them; the count is the seed, too.
+/// Dots on a surface by one method; the count is also the seed.
 std::vector<ParametricDot> dots_on(ParametricShape shape, ParametricOptions options, std::uint64_t count) {
   options.dot_count = options.seed = count;
   return sample_parametric(*make_surface(shape), options).dots;
@@ -202,7 +202,7 @@ void mesh_table(Run& run, const std::string& file, double of_thesis) {
   PlacementOptions placement;
   placement.size_m = .08;
   const RepairedMesh repaired = repair_mesh(place_on_table(load_model(file, load_image_file), placement));
-  TexturedMesh mesh = repaired.mesh;  // black all over: constant density
+  TexturedMesh mesh = repaired.mesh;  // all black: constant density
   for (auto& luminance : mesh.corner_luminance) luminance = {0, 0, 0};
   for (auto& material : mesh.materials) material = {"", ColorSource::kColors, -1, true, true, 1};
   const ToneField tone(mesh, {});

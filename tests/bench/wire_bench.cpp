@@ -1,11 +1,12 @@
-// What the wire costs: a program painted through the real drivers against the device servers of sim/wire, beside the
-// same program on the cell in process; whose time a dot takes; and how long a stop takes until the light is off.
+// The cost of the wire: a program painted through the real drivers against the device servers of sim/wire, beside the
+// same program on the cell in process; how the time of a dot is divided; and the time from a stop to light off.
 //
 //   wire_bench [STOPS]                        a generated program of 150 dots, 60 of them in real time, 40 stops
-//   wire_bench ahead                              what is gained by what devices are told ahead, in real time
+//   wire_bench ahead                          the gain from messages sent ahead, in real time
 //   wire_bench MODEL SIZE_MM DPI SCALE REAL STOPS
 //
-// paints MODEL at SCALE wall seconds a cell second, then the first REAL dots of it in real time, then measures STOPS.
+// paints MODEL at SCALE wall seconds for each second of the cell, then its first REAL dots in real time, then measures
+// STOPS.
 
 #include <algorithm>
 #include <chrono>
@@ -52,7 +53,24 @@ ExposureProgram planned(const std::string& model, double size_mm, double dpi) {
   return read_program(folder.path() / "program.ply");
 }
 
-/// Paints on the wire and prints whose time it took.
+/// The time that dots take beyond the devices' own times.
+void print_added_times(const std::vector<TimeRecord::Dot>& dots) {
+  std::vector<double> before;
+  std::vector<double> after;
+  std::vector<double> both;
+  for (const TimeRecord::Dot& dot : dots) {
+    before.push_back(dot.before_s);
+    after.push_back(dot.after_s);
+    both.push_back(dot.before_s + dot.after_s);
+  }
+  std::printf(
+      "  added a dot, ms of the cell: median %.3f, p99 %.3f, worst %.3f (before the light %.3f / %.3f, after it %.3f / "
+      "%.3f)\n",
+      quantile(both, .5) * 1e3, quantile(both, .99) * 1e3, quantile(both, 1) * 1e3, quantile(before, .5) * 1e3,
+      quantile(before, .99) * 1e3, quantile(after, .5) * 1e3, quantile(after, .99) * 1e3);
+}
+
+/// Paints on the wire and prints how the time is divided between devices, drivers and executor.
 std::vector<Emission> painted_on_wire(const ExposureProgram& program, double time_scale) {
   WiredWorld world(WiredWorld::quick(time_scale));
   ExecutionControl control;
@@ -61,9 +79,9 @@ std::vector<Emission> painted_on_wire(const ExposureProgram& program, double tim
   const auto begun = Wall::now();
   ExecutionResult result = execute(program, {}, world.cell(), world.description, journal, control);
   // On a busy machine the laser's guard may miss its heartbeat and stop the job, which goes on then.
-  constexpr int kResumesMax = 1000;
+  constexpr int kMaxResumes = 1000;
   int resumes = 0;
-  while (result.outcome != ExecutionOutcome::kFinished && resumes < kResumesMax) {
+  while (result.outcome != ExecutionOutcome::kFinished && resumes < kMaxResumes) {
     if (++resumes <= 3) std::printf("  stopped: %s\n", result.reason.c_str());
     world.recover(control, 100);
     const auto robot = world.cell().robot.status().positions;
@@ -78,20 +96,10 @@ std::vector<Emission> painted_on_wire(const ExposureProgram& program, double tim
     result.own_time = own_time;
   }
   const double wall_s = std::chrono::duration<double>(Wall::now() - begun).count();
-  std::vector<double> before, after, both;
-  for (const TimeRecord::Dot& dot : world.wire().dot_times()) {
-    before.push_back(dot.before_s);
-    after.push_back(dot.after_s);
-    both.push_back(dot.before_s + dot.after_s);
-  }
   std::printf("scale %g: %zu of %zu dots, %zu in doubt, %d stops; %.1f s of the cell, %.1f s wall\n", time_scale,
               journal.done_count(), program.exposures.size(), journal.in_doubt().size(), resumes, result.elapsed_s,
               wall_s);
-  std::printf(
-      "  added a dot, ms of the cell: median %.3f, p99 %.3f, worst %.3f (before the light %.3f / %.3f, after it %.3f / "
-      "%.3f)\n",
-      quantile(both, .5) * 1e3, quantile(both, .99) * 1e3, quantile(both, 1) * 1e3, quantile(before, .5) * 1e3,
-      quantile(before, .99) * 1e3, quantile(after, .5) * 1e3, quantile(after, .99) * 1e3);
+  print_added_times(world.wire().dot_times());
   std::printf("  the same by the executor's own watch: median %.3f, p99 %.3f, worst %.3f\n",
               result.own_time.quantile_s(.5) * 1e3, result.own_time.quantile_s(.99) * 1e3,
               result.own_time.longest_s() * 1e3);
@@ -153,7 +161,7 @@ void compare_films(const std::string& model, double size_mm, const std::vector<E
               away.size(), quantile(away, .5), quantile(away, .99), quantile(away, 1), missed);
 }
 
-/// The same device, told nothing ahead.
+/// The same device, without messages sent ahead.
 template <std::size_t N>
 class ToldInTime final : public AxisGroup<N> {
  public:
@@ -188,7 +196,7 @@ class LaserToldInTime final : public Laser {
   Laser& laser_;
 };
 
-/// The table moves for every dot, each with another power; a chain of way-points of the arm before every tenth.
+/// The table moves for every dot, each with another power; a chain of waypoints of the arm before every tenth.
 ExposureProgram restless_job(const CellDescription& cell, std::size_t count) {
   ExposureProgram program = test::small_job(cell, count, 1, count);
   program.vias.clear();
