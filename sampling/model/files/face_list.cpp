@@ -13,8 +13,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-/// In units of the file. Beyond this, squares and volumes of coordinates leave the range of numbers.
-constexpr double kMaxCoordinate = 1e30;
 
 double linear_of_srgb(double encoded) {
   const double c = std::clamp(encoded, 0., 1.);

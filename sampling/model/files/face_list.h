@@ -13,6 +13,9 @@
 
 namespace hilbrush {
 
+/// In units of the file. Beyond this, squares and volumes of coordinates leave the range of numbers.
+inline constexpr double kMaxCoordinate = 1e30;
+
 /// A shape as every format's reader makes it: polygons of any size over a list of points, in the shape's own frame.
 struct FaceList {
   std::vector<Eigen::Vector3d> points;

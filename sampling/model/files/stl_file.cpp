@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 80;
 constexpr std::size_t kTriangleBytes = 50;
-constexpr double kMaxCoordinate = 1e30;  ///< in units of the file, as in face_list.cpp
 
 std::uint32_t count_of(const std::string& bytes) {
   std::uint32_t count = 0;
