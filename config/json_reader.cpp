@@ -48,7 +48,9 @@ double to_si(double value, double unit) {
   return unit == 1e-3 ? value / 1e3 : value * unit;
 }
 
+/// An origin that is itself a path ("$.settings") is continued: "$.settings.dpi".
 std::string join(const std::string& origin, const std::string& path) {
+  if (origin.starts_with("$")) return origin + path.substr(1);
   return origin.empty() ? path : origin + ": " + path;
 }
 

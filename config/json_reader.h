@@ -13,7 +13,7 @@
 /// Strict reading of JSON that people write. Every value is read by key, with its range. Keys that are not read are
 /// errors, and so are duplicate keys, wrong types and documents that are too large or too deep. Each error is an
 /// InputError whose at() is "<origin>: <JSON path>" (or the path alone), such as
-/// "cells/default.json: $.axes.j1.max_deg".
+/// "cells/default.json: $.axes.j1.max_deg". An origin that is a JSON path is continued by the path.
 ///
 /// The unit is part of the key (max_deg, radius_mm, power_max_mw); values are returned in SI units.
 namespace hilbrush {

@@ -98,6 +98,11 @@ TEST(JsonReader, EveryMistakeIsRefusedWithItsPathAndASentence) {
   for (const Case& c : cases) EXPECT_EQ(error_of(changed(c.from, c.to)), c.error);
 }
 
+TEST(JsonReader, AnOriginThatIsAPathIsContinued) {
+  EXPECT_EQ(error_of(changed("0.5", "2"), "$.settings"), "$.settings.share: expected a number from 0 to 1, found 2");
+  EXPECT_EQ(error_of("[]", "$.settings"), "$.settings: expected an object, found a list of 0");
+}
+
 TEST(JsonReader, OptionalKeysMayBeNullOrAbsentButNotWrong) {
   EXPECT_EQ(error_of(changed("\"on\":true", "\"on\":true,\"extra\":null")), "accepted");
   EXPECT_EQ(error_of(changed("\"on\":true", "\"on\":true,\"extra\":7")), "accepted");
