@@ -188,7 +188,7 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
       declare_with_id(app, context, "move", "move a waiting job to another position in the queue", move);
   move_command.app->add_option("POSITION", move_command.flags->position, "1: the next to be painted")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 1'000'000));
   declare_with_id(app, context, "cancel", "cancel a job; its remaining dots are not painted",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.cancel", false); });
 }

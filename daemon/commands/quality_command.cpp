@@ -14,6 +14,7 @@
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
 #include "daemon/commands/given_files.h"
+#include "daemon/commands/number_checks.h"
 #include "daemon/commands/pipeline_run.h"
 #include "daemon/commands/progress_display.h"
 #include "daemon/commands/text_output.h"
@@ -211,9 +212,10 @@ void add_quality_command(CLI::App& app, CommandContext& context) {
                       "instead of dots along a curve, in the plane or on the sphere: random, jittered, halton, "
                       "hammersley, sobol or niederreiter");
   command->add_option("--count", flags->counts, "number of dots (default 10000); two or more give slopes")
-      ->delimiter(',');
-  command->add_option("--seed", flags->seed, "of the random numbers (default 1)");
-  command->add_option("--shapes", flags->shapes, "test shapes of each kind (default 1000)");
+      ->delimiter(',')
+      ->check(not_negative());
+  command->add_option("--seed", flags->seed, "of the random numbers (default 1)")->check(not_negative());
+  command->add_option("--shapes", flags->shapes, "test shapes of each kind (default 1000)")->check(not_negative());
   command->callback([&context, flags] { context.action = [&context, flags] { return run(context, *flags); }; });
 }
 

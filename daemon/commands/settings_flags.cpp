@@ -2,10 +2,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "config/json_reader.h"
+#include "daemon/commands/number_checks.h"
+#include "sampling/base/text.h"
 
 namespace hilbrush {
 namespace {
@@ -23,15 +27,28 @@ std::string flag_of_path(const std::string& path) {
   return flag;
 }
 
+/// JSON has no nan and no infinity: they would become null, which means "not given".
+template <class T>
+void refuse_not_finite(const char* key, const T& value) {
+  if constexpr (std::is_same_v<T, double>) {
+    if (!std::isfinite(value)) throw InputError(std::string("$.") + key, "expected a number, found " + number(value));
+  } else if constexpr (std::is_same_v<T, std::vector<double>>) {
+    for (const double each : value) refuse_not_finite(key, each);
+  }
+}
+
 template <class T>
 void put(Json& json, const char* key, const std::optional<T>& value) {
-  if (value) json[key] = *value;
+  if (!value) return;
+  refuse_not_finite(key, *value);
+  json[key] = *value;
 }
 
 /// Sets one key of an object inside the settings.
 template <class T>
 void put_inside(Json& json, const char* object, const char* key, const std::optional<T>& value) {
   if (!value) return;
+  refuse_not_finite(key, *value);
   if (!json.contains(object) || json[object].is_null()) json[object] = Json::object();
   json[object][key] = *value;
 }
@@ -53,7 +70,9 @@ constexpr const char* kDpiHelp = "dots per inch where the tone is full, 10 to 12
 
 void add_size_flags(SettingsFlags& flags, CLI::App& command) {
   command.add_option("--dpi", flags.dpi, kDpiHelp)->group(kGroup);
-  command.add_option("--dots", flags.dots, "instead of --dpi: the exact number of dots")->group(kGroup);
+  command.add_option("--dots", flags.dots, "instead of --dpi: the exact number of dots")
+      ->check(not_negative())
+      ->group(kGroup);
   command.add_option("--size-mm", flags.size_mm, "scale the longest side of the model to this")->group(kGroup);
   command.add_option("--units-mm", flags.units_mm, "instead of --size-mm: millimeters per unit of the file")
       ->group(kGroup);
@@ -74,6 +93,7 @@ void add_tone_flags(SettingsFlags& flags, CLI::App& command) {
   command
       .add_option("--predictive-rounds", flags.predictive_rounds,
                   "predict the picture and place the dots again, 0 to 4 times (default 0; 2 are enough)")
+      ->check(not_negative())
       ->group(kGroup);
   command
       .add_option("--largest-gap-pitches", flags.largest_gap_pitches,
@@ -172,10 +192,13 @@ void SettingsFlags::add_paint_flags_to(CLI::App& command) {
                   "centroid (default), jittered, even, random, halton, hammersley, sobol, niederreiter, blue or fine")
       ->group(kGroup);
   command.add_option("--curve", curve, "hilbert (default), peano2 or laminar")->group(kGroup);
-  command.add_option("--levels", levels, "number of energies that a dot may have, 1 to 4 (default 1)")->group(kGroup);
-  command.add_option("--fine-passes", fine_passes, "of the sampler fine, each over all dots, 1 to 1000 (default 24)")
+  command.add_option("--levels", levels, "number of energies that a dot may have, 1 to 4 (default 1)")
+      ->check(not_negative())
       ->group(kGroup);
-  command.add_option("--seed", seed, "of the random numbers (default 1)")->group(kGroup);
+  command.add_option("--fine-passes", fine_passes, "of the sampler fine, each over all dots, 1 to 1000 (default 24)")
+      ->check(not_negative())
+      ->group(kGroup);
+  command.add_option("--seed", seed, "of the random numbers (default 1)")->check(not_negative())->group(kGroup);
   command.add_option("--cell", cell, "name of a cell, or its file (default: default)")->group(kGroup);
   command.add_option("--settings", file, "JSON file with any of these settings; flags override it")->group(kGroup);
   if (command.get_option_no_throw("--dpi") == nullptr) command.add_option("--dpi", dpi, kDpiHelp)->group(kGroup);
@@ -191,13 +214,13 @@ bool SettingsFlags::any() const {
 std::string SettingsFlags::to_json(const std::string& base, const std::string& base_origin) const {
   Json json = Json::object();
   const std::string text = file.empty() ? base : read_text_file(file, kSettingsBytesMax);
-  if (!text.empty()) {
+  if (!file.empty() || !text.empty()) {
     job_settings_from_json(text, file.empty() ? base_origin : file);
     json = Json::parse(text);
   }
-  put_sampling(*this, json);
-  put_planning(*this, json);
   try {
+    put_sampling(*this, json);
+    put_planning(*this, json);
     const JobSettings settings = job_settings_from_json(json.dump());
     if (json.contains("cell") && is_path(settings.cell))
       json["cell"] = std::filesystem::absolute(settings.cell).lexically_normal();
