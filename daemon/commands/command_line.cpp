@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <ostream>
 
+#include "config/json_reader.h"
 #include "config/rpc_errors.h"
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
@@ -107,6 +109,68 @@ CLI::App* add_daemon_command(CLI::App& app, CommandContext& context, const std::
   return command;
 }
 
+namespace {
+
+/// "foo" and "--size" as they would be keys: "foo", "size".
+std::string as_key(std::string word) {
+  word.erase(0, word.find_first_not_of('-'));
+  std::replace(word.begin(), word.end(), '-', '_');
+  return word;
+}
+
+/// The one of `words` that `word` is probably a misspelling of, or nothing.
+std::optional<std::string> nearest_argument(const std::string& word, const std::vector<std::string>& words) {
+  std::vector<std::string> keys;
+  for (const std::string& each : words) keys.push_back(as_key(each));
+  const std::optional<std::string> nearest = nearest_word(as_key(word), keys);
+  if (!nearest) return std::nullopt;
+  return words[static_cast<std::size_t>(std::find(keys.begin(), keys.end(), *nearest) - keys.begin())];
+}
+
+/// For the first argument that is not understood, what was probably meant: "no command foo; did you mean ...?".
+std::string unknown_argument_sentence(const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (unknown.empty()) return {};
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const bool is_command = chosen.empty() && !unknown.front().starts_with("-");
+  if (!is_command && !unknown.front().starts_with("-")) return {};
+  const std::string word = unknown.front().substr(0, unknown.front().find('='));
+  std::vector<std::string> words;
+  if (is_command)
+    for (const CLI::App* command : app.get_subcommands({})) words.push_back(command->get_name());
+  else
+    for (const CLI::Option* option : (chosen.empty() ? app : *chosen.front()).get_options())
+      for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+  const std::optional<std::string> meant = nearest_argument(word, words);
+  return std::string(is_command ? "no command is called " : "there is no flag ") + word +
+         (meant ? "; did you mean " + *meant + "?" : "");
+}
+
+int report_usage(const CLI::App& app, const CLI::ParseError& error, Terminal& terminal) {
+  const std::string sentence = unknown_argument_sentence(app);
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  terminal.err << "hilbrush: " << printable(sentence.empty() ? error.what() : sentence) << "\nTry hilbrush "
+               << (chosen.empty() ? "" : chosen.front()->get_name() + " ") << "--help.\n";
+  return kExitUsage;
+}
+
+/// `help` and `help COMMAND` are --help and COMMAND --help.
+std::vector<std::string> with_help_flag(std::vector<std::string> arguments) {
+  if (arguments.empty() || arguments.front() != "help") return arguments;
+  arguments.erase(arguments.begin());
+  arguments.emplace_back("--help");
+  return arguments;
+}
+
+/// A full disk or a closed pipe is a failure, too.
+int checked_output(const CommandContext& context, int exit_code) {
+  if (context.terminal.out.flush() || exit_code != kExitOk) return exit_code;
+  context.terminal.err << "hilbrush: standard output cannot be written" << std::endl;
+  return kExitInternal;
+}
+
+}  // namespace
+
 int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal) {
   CommandContext context{terminal, default_socket(), false, {}};
   CLI::App app("Paints pictures on three-dimensional objects with light.", "hilbrush");
@@ -120,18 +184,19 @@ int run_hilbrush(const std::vector<std::string>& arguments, Terminal& terminal) 
     add_cell_commands(app, context);
     add_check_command(app, context);
     add_commissioning_commands(app, context);
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back
+    std::vector<std::string> words = with_help_flag(arguments);
+    std::reverse(words.begin(), words.end());  // CLI11 takes them from the back
+    app.parse(words);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // help or version was asked for
       app.exit(error, terminal.out, terminal.err);
-      return kExitOk;
+      return checked_output(context, kExitOk);
     }
-    terminal.err << "hilbrush: " << printable(error.what()) << "\nTry hilbrush --help.\n";
-    return kExitUsage;
+    return report_usage(app, error, terminal);
   } catch (const std::exception& error) {
     return report_failure(context, kExitInternal, {}, error.what());
   }
-  return run_action(context);
+  return checked_output(context, run_action(context));
 }
 
 }  // namespace hilbrush

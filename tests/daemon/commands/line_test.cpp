@@ -62,6 +62,64 @@ TEST(CommandLine, WrongUsageIsTwo) {
   }
 }
 
+TEST(CommandLine, TheNearestCommandOrFlagIsNamed) {
+  struct Case {
+    std::vector<std::string> arguments;
+    const char* error;
+  };
+  const Case cases[] = {
+      {{"foo"}, "no command is called foo\nTry hilbrush --help.\n"},
+      {{"submitt"}, "no command is called submitt; did you mean submit?\nTry hilbrush --help.\n"},
+      {{"dryrun", "m.obj"}, "no command is called dryrun; did you mean dry-run?\nTry hilbrush --help.\n"},
+      {{"plan", "m.obj", "-o", "d", "--size", "60"},
+       "there is no flag --size; did you mean --size-mm?\nTry hilbrush plan --help.\n"},
+      {{"plan", "m.obj", "-o", "d", "--smapler=even"},
+       "there is no flag --smapler; did you mean --sampler?\nTry hilbrush plan --help.\n"},
+      {{"--verion"}, "there is no flag --verion; did you mean --version?\nTry hilbrush --help.\n"},
+  };
+  for (const Case& c : cases) {
+    const CommandRun run = run_command(c.arguments);
+    EXPECT_EQ(run.exit_code, kExitUsage);
+    EXPECT_EQ(run.err, std::string("hilbrush: ") + c.error);
+  }
+}
+
+TEST(CommandLine, HelpIsACommandToo) {
+  EXPECT_EQ(run_command({"help"}).out, run_command({"--help"}).out);
+  EXPECT_EQ(run_command({"help", "plan"}).out, run_command({"plan", "--help"}).out);
+  EXPECT_EQ(run_command({"help"}).exit_code, kExitOk);
+}
+
+TEST(CommandLine, NegativeAndEndlessNumbersAreRefused) {
+  const auto error = [](std::vector<std::string> flags) {
+    flags.insert(flags.begin(), {"plan", "/none.obj", "-o", "d"});
+    return run_command(flags);
+  };
+  for (const char* value : {"nan", "inf", "-inf"}) {
+    for (const char* flag : {"--size-mm", "--dpi", "--max-incidence-deg", "--post-height-mm", "--turn-deg"}) {
+      const CommandRun run = error({std::string(flag) + "=" + value});
+      EXPECT_EQ(run.exit_code, kExitBadInput) << flag;
+      EXPECT_EQ(run.err, std::string("hilbrush: ") + flag + ": expected a number, found " + value + "\n");
+    }
+    EXPECT_EQ(error({std::string("--offset-mm=0,0,") + value}).exit_code, kExitBadInput);
+  }
+  const CommandRun run = error({"--dots", "-4"});
+  EXPECT_EQ(run.exit_code, kExitUsage);
+  EXPECT_NE(run.err.find("--dots: expected a whole number of at least 0, found -4"), std::string::npos) << run.err;
+  EXPECT_EQ(run_command({"move", "3", "0"}).exit_code, kExitUsage);
+  EXPECT_LT(run_command({"move", "3", "0"}).err.size(), 120u);
+}
+
+TEST(CommandLine, OutputThatCannotBeWrittenIsAFailure) {
+  std::ostringstream out, err;
+  std::istringstream in;
+  out.setstate(std::ios::badbit);
+  Terminal terminal{out, err, in};
+  EXPECT_EQ(run_hilbrush({"check-config"}, terminal), kExitInternal);
+  EXPECT_EQ(err.str(), "hilbrush: standard output cannot be written\n");
+  EXPECT_EQ(run_hilbrush({"--help"}, terminal), kExitInternal);
+}
+
 TEST(CommandLine, NoDaemonIsFour) {
   const TemporaryFolder folder;
   const std::string socket = (folder.path() / "none").string();
