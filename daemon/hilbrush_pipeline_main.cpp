@@ -95,7 +95,7 @@ int run_and_answer(const std::string& command, const Arguments& arguments) {
   };
   try {
     print_line({{"result", run(command, arguments, listener)}});
-    return kOk;
+    return std::cout ? kOk : kInternal;  // the result is not delivered if standard output cannot be written
   } catch (const InputError& error) {
     return fail(error.at(), error.sentence(), kBadInput);
   } catch (const ProgramFileError& error) {

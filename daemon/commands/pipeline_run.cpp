@@ -202,6 +202,8 @@ std::string signal_sentence(int signal) {
   if (signal == SIGKILL)
     return "hilbrush-pipeline was killed" + by +
            ", probably because memory ran out: fewer dots, a smaller texture or a coarser mesh need less";
+  if (signal == SIGXCPU || signal == SIGXFSZ)
+    return "hilbrush-pipeline was ended by a resource limit of this session" + by + ": see `ulimit -a`";
   if (signal == SIGTERM || signal == SIGINT || signal == SIGHUP) return "hilbrush-pipeline was ended from outside" + by;
   return "hilbrush-pipeline crashed" + by + "; this is a fault of the program, not of the model";
 }

@@ -166,6 +166,8 @@ TEST_F(PipelineCommands, BadInputIsRefusedBeforeTheChildStarts) {
   const std::string settings = folder_.write("job.json", R"({"dpi":5})");
   EXPECT_EQ(error({"plan", model_, "--settings", settings}),
             "hilbrush: " + settings + ": $.dpi: expected a number from 10 to 1200, found 5\n");
+  const std::string empty = folder_.write("empty.json", "");
+  EXPECT_TRUE(error({"plan", model_, "--settings", empty}).starts_with("hilbrush: " + empty + ":1: not JSON"));
   EXPECT_NE(error({"plan", model_, "--cell", "none"}).find("no cell is called \"none\""), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path("arguments")));
 }
@@ -186,6 +188,7 @@ TEST_F(PipelineCommands, AChildThatDiesIsReportedInASentence) {
       {"kill -9 $$", "hilbrush-pipeline was killed (signal 9, Killed), probably because memory ran out"},
       {"kill -11 $$", "hilbrush-pipeline crashed (signal 11, Segmentation fault); this is a fault of the program"},
       {"kill -15 $$", "hilbrush-pipeline was ended from outside (signal 15, Terminated)"},
+      {"kill -25 $$", "hilbrush-pipeline was ended by a resource limit of this session (signal 25, File size limit"},
       {"exit 1", "hilbrush-pipeline ended with code 1 and without a result"},
       {"exit 0", "hilbrush-pipeline ended with code 0 and without a result"},
       {"echo '{\"result\":{}}'; exit 1", "hilbrush-pipeline ended with code 1 after its result"},
