@@ -31,7 +31,8 @@ class PaintModel {
 
  private:
   struct Blob {
-    Eigen::Vector3f place = Eigen::Vector3f::Zero(), normal = Eigen::Vector3f::Zero();
+    Eigen::Vector3f place = Eigen::Vector3f::Zero();
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     std::uint32_t begin = 0, end = 0;                 ///< its nodes
     float error = 0;                                  ///< painted minus wanted, summed over its nodes
     float blurred = 0;                                ///< that error, blurred twice

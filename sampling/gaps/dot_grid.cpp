@@ -72,8 +72,8 @@ DotGrid::Nearest DotGrid::nearest(const Eigen::Vector3d& place_O, const Eigen::V
 std::vector<std::uint32_t> DotGrid::within(const Eigen::Vector3d& place_O, const Eigen::Vector3f& normal_O,
                                            double reach_m) const {
   std::vector<std::uint32_t> found;
-  const Cell low = cell_of(place_O - Eigen::Vector3d::Constant(reach_m)),
-             high = cell_of(place_O + Eigen::Vector3d::Constant(reach_m));
+  const Cell low = cell_of(place_O - Eigen::Vector3d::Constant(reach_m));
+  const Cell high = cell_of(place_O + Eigen::Vector3d::Constant(reach_m));
   for (std::int64_t x = low.x(); x <= high.x(); ++x)
     for (std::int64_t y = low.y(); y <= high.y(); ++y)
       for (std::int64_t z = low.z(); z <= high.z(); ++z)

@@ -26,7 +26,8 @@ double DotPath::growth(std::uint32_t before, std::uint32_t after, const Dot& dot
 void DotPath::insert_last(const std::vector<std::uint32_t>& nearby) {
   CHECK_EQ(next_.size() + 1, dots_.size());
   const auto dot = static_cast<std::uint32_t>(dots_.size() - 1);
-  std::uint32_t before = last_, after = kEnd;
+  std::uint32_t before = last_;
+  std::uint32_t after = kEnd;
   double least = std::numeric_limits<double>::infinity();
   const auto consider = [&](std::uint32_t b, std::uint32_t a) {
     const double grown = growth(b, a, dots_[dot]);

@@ -25,7 +25,8 @@ class DotPath {
 
   const std::vector<Dot>& dots_;
   std::vector<std::uint32_t> next_, previous_;
-  std::uint32_t first_ = kEnd, last_ = kEnd;
+  std::uint32_t first_ = kEnd;
+  std::uint32_t last_ = kEnd;
 };
 
 }  // namespace hilbrush

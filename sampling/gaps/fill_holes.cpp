@@ -42,7 +42,9 @@ constexpr std::size_t kBlocks = 256;
 
 /// Center of the circle through three points in space; none if they lie in line.
 std::optional<Vector3d> circle_center(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Vector3d u = b - a, v = c - a, n = u.cross(v);
+  const Vector3d u = b - a;
+  const Vector3d v = c - a;
+  const Vector3d n = u.cross(v);
   if (n.squaredNorm() <= 1e-12 * u.squaredNorm() * v.squaredNorm()) return {};
   return a + (u.squaredNorm() * v.cross(n) + v.squaredNorm() * n.cross(u)) / (2 * n.squaredNorm());
 }
@@ -50,8 +52,11 @@ std::optional<Vector3d> circle_center(const Vector3d& a, const Vector3d& b, cons
 SurfacePoint point_of(const TexturedMesh& mesh, const Dot& dot) {
   const Vector3d& a = mesh.corner(dot.triangle, 0);
   const Vector3d n = 2 * mesh.area_vector(dot.triangle);
-  const Vector3d u = mesh.corner(dot.triangle, 1) - a, v = mesh.corner(dot.triangle, 2) - a, w = dot.position_O - a;
-  const double f = w.cross(v).dot(n) / n.squaredNorm(), g = u.cross(w).dot(n) / n.squaredNorm();
+  const Vector3d u = mesh.corner(dot.triangle, 1) - a;
+  const Vector3d v = mesh.corner(dot.triangle, 2) - a;
+  const Vector3d w = dot.position_O - a;
+  const double f = w.cross(v).dot(n) / n.squaredNorm();
+  const double g = u.cross(w).dot(n) / n.squaredNorm();
   return {dot.triangle, {1 - f - g, f, g}};
 }
 

@@ -32,12 +32,15 @@ double GapMeter::strictest_m() const {
 }
 
 double GapMeter::mean_tone(const SurfacePoint& point, double radius_m) const {
-  const Vector3d middle = position(surface_.mesh, point), normal = face_normal(surface_.mesh, point);
-  const Vector3d across = normal.unitOrthogonal(), along = normal.cross(across);
+  const Vector3d middle = position(surface_.mesh, point);
+  const Vector3d normal = face_normal(surface_.mesh, point);
+  const Vector3d across = normal.unitOrthogonal();
+  const Vector3d along = normal.cross(across);
   double sum = 0;
   for (int k = 0; k < kToneSamples; ++k) {
     // Vogel's sunflower pattern (golden angle): even over the disc.
-    const double r = radius_m * std::sqrt((k + .5) / kToneSamples), turn = k * std::numbers::pi * (3 - std::sqrt(5.));
+    const double r = radius_m * std::sqrt((k + .5) / kToneSamples);
+    const double turn = k * std::numbers::pi * (3 - std::sqrt(5.));
     const Vector3d target = middle + r * (std::cos(turn) * across + std::sin(turn) * along);
     sum += tone_.asked(walk_towards(surface_, point, target));
   }
@@ -104,8 +107,8 @@ void GapMeter::find_suspects(std::uint32_t triangle, std::vector<Suspect>& suspe
       return std::max({(places[0] - from).norm(), (places[1] - from).norm(), (places[2] - from).norm()});
     };
     const SurfacePoint centroid{triangle, (corners[0] + corners[1] + corners[2]) / 3}, middle{triangle, middle_b};
-    const double from_centroid = reach(position(surface_.mesh, centroid)),
-                 from_middle = reach(position(surface_.mesh, middle));
+    const double from_centroid = reach(position(surface_.mesh, centroid));
+    const double from_middle = reach(position(surface_.mesh, middle));
     const bool is_centroid = from_centroid <= from_middle;
     const double radius = std::min(from_centroid, from_middle);
     switch (judge(triangle, corners, is_centroid ? centroid : middle, radius)) {

@@ -14,10 +14,13 @@ using Eigen::Vector3d;
 /// Barycentric coordinates of b in a face; all 0 if it has no area in its triangle.
 Vector3d weights_in(const std::array<Vector2d, 3>& corners_b, const Vector2d& b) {
   const Vector2d& o = corners_b[0];
-  const Vector2d p = corners_b[1] - o, q = corners_b[2] - o, w = b - o;
+  const Vector2d p = corners_b[1] - o;
+  const Vector2d q = corners_b[2] - o;
+  const Vector2d w = b - o;
   const double area = p.x() * q.y() - p.y() * q.x();
   if (area == 0) return Vector3d::Zero();
-  const double f = (w.x() * q.y() - w.y() * q.x()) / area, g = (p.x() * w.y() - p.y() * w.x()) / area;
+  const double f = (w.x() * q.y() - w.y() * q.x()) / area;
+  const double g = (p.x() * w.y() - p.y() * w.x()) / area;
   return {1 - f - g, f, g};
 }
 

@@ -26,7 +26,8 @@ class SquarePlaces {
   std::vector<std::uint32_t> components_;
   /// Faces by triangle: faces_[first_[t]] .. faces_[first_[t + 1]].
   struct FaceIndex {
-    std::uint32_t chart = 0, face = 0;
+    std::uint32_t chart = 0;
+    std::uint32_t face = 0;
   };
   std::vector<std::uint32_t> first_;
   std::vector<FaceIndex> faces_;

@@ -98,7 +98,8 @@ std::vector<ContourPiece> Slices::pieces(std::size_t slice) const {
     piece.triangle = t;
     int crossings = 0;
     for (int side = 0; side < 3; ++side) {
-      const bool starts_above = mesh_.corner(t, side).z() >= z, ends_above = mesh_.corner(t, (side + 1) % 3).z() >= z;
+      const bool starts_above = mesh_.corner(t, side).z() >= z;
+      const bool ends_above = mesh_.corner(t, (side + 1) % 3).z() >= z;
       if (starts_above == ends_above) continue;
       const Crossing crossing = cross_edge(mesh_, t, side, z);
       ++crossings;

@@ -18,7 +18,9 @@ struct DivisionRule {
 /// A square of the parameter domain: column x and row y of side_count^2 equal ones.
 template <class Quad>
 struct Node {
-  std::uint64_t x = 0, y = 0, side_count = 1;
+  std::uint64_t x = 0;
+  std::uint64_t y = 0;
+  std::uint64_t side_count = 1;
   int depth = 0;
   Quad quad;
   bool has_grid = false;
@@ -33,7 +35,8 @@ struct Node {
   Eigen::Vector2d center_uv() const { return uv(.5, .5); }
   /// The place of grid[k].
   Eigen::Vector2d grid_uv(unsigned k) const {
-    const unsigned column = k % 3, row = k / 3;
+    const unsigned column = k % 3;
+    const unsigned row = k / 3;
     return uv(.5 * column, .5 * row);
   }
 };

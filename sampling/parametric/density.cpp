@@ -21,7 +21,8 @@ bool is_curvature(ParametricDensity density) {
 /// The value below which `share` of the total weight lies.
 double weighted_quantile(std::vector<std::pair<double, double>> values_and_weights, double share) {
   std::sort(values_and_weights.begin(), values_and_weights.end());
-  double total = 0, passed = 0;
+  double total = 0;
+  double passed = 0;
   for (const auto& [value, weight] : values_and_weights) total += weight;
   for (const auto& [value, weight] : values_and_weights) {
     passed += weight;

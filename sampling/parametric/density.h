@@ -22,7 +22,8 @@ class DensityOnSurface {
   const ParametricSurface& surface_;
   ParametricDensity density_;
   double largest_ = 0;  ///< curvature is clipped here
-  double area_ = 0, mean_ = 0;
+  double area_ = 0;
+  double mean_ = 0;
 };
 
 }  // namespace hilbrush

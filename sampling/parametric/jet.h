@@ -6,7 +6,9 @@
 namespace hilbrush {
 
 struct Jet {
-  double value = 0, first = 0, second = 0;
+  double value = 0;
+  double first = 0;
+  double second = 0;
 
   /// offset + slope * t
   static Jet linear(double t, double slope, double offset) { return {offset + slope * t, slope, 0}; }
@@ -37,16 +39,19 @@ inline Jet cos(const Jet& a) {
 }
 /// Keeps the sign. Its derivatives are infinite at 0.
 inline Jet cube_root(const Jet& a) {
-  const double root = std::cbrt(a.value), first = 1 / (3 * root * root);
+  const double root = std::cbrt(a.value);
+  const double first = 1 / (3 * root * root);
   return compose(root, first, -2 * first / (3 * root * root * root), a);
 }
 /// sin(x) / x
 inline Jet sinc(const Jet& a) {
-  const double x = a.value, x2 = x * x;
+  const double x = a.value;
+  const double x2 = x * x;
   if (std::abs(x) < .1)  // the series to x^6: errors below 1e-12
     return compose(1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42)), -x / 3 * (1 - x2 / 10 * (1 - x2 / 28)),
                    -1. / 3 + x2 / 10 * (1 - x2 * 5 / 84), a);
-  const double s = std::sin(x), c = std::cos(x);
+  const double s = std::sin(x);
+  const double c = std::cos(x);
   return compose(s / x, (c - s / x) / x, (-s - 2 * (c - s / x) / x) / x, a);
 }
 

@@ -17,7 +17,10 @@ inline double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
 template <class Quad>
 double square_area(const ParametricSurface& surface, const Node<Quad>& leaf) {
   const auto corner = [&](unsigned k) { return leaf.has_grid ? leaf.grid[k] : surface.position(leaf.grid_uv(k)); };
-  const Eigen::Vector3d a = corner(0), b = corner(2), c = corner(8), d = corner(6);
+  const Eigen::Vector3d a = corner(0);
+  const Eigen::Vector3d b = corner(2);
+  const Eigen::Vector3d c = corner(8);
+  const Eigen::Vector3d d = corner(6);
   return triangle_area(a, b, c) + triangle_area(a, c, d);
 }
 

@@ -63,7 +63,8 @@ std::vector<Vector2d> jittered_grid(std::uint64_t count, std::uint64_t seed) {
   std::vector<Vector2d> points;
   points.reserve(side * side);
   for (std::uint64_t i = 0; i < side * side; ++i) {
-    const std::uint64_t column = i % side, row = i / side;
+    const std::uint64_t column = i % side;
+    const std::uint64_t row = i / side;
     const Vector2d corner(static_cast<double>(column), static_cast<double>(row));
     const Vector2d offset(uniform_number(seed, 2 * i), uniform_number(seed, 2 * i + 1));
     points.emplace_back((corner + offset) / static_cast<double>(side));
@@ -105,7 +106,9 @@ std::vector<Vector2d> plane_set(PlaneSet set, std::uint64_t count, std::uint64_t
 }
 
 Eigen::Vector3d equal_area_sphere(const Vector2d& uv) {
-  const double z = 2 * uv.y() - 1, radius = std::sqrt(std::max(0., 1 - z * z)), turn = 2 * std::numbers::pi * uv.x();
+  const double z = 2 * uv.y() - 1;
+  const double radius = std::sqrt(std::max(0., 1 - z * z));
+  const double turn = 2 * std::numbers::pi * uv.x();
   return {radius * std::cos(turn), radius * std::sin(turn), z};
 }
 

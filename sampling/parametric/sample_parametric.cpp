@@ -120,7 +120,8 @@ class Sampling {
   /// First walk: the mass before each node.
   void measure(ParametricSamples& samples) {
     struct Sum {
-      double area = 0, mass = 0;
+      double area = 0;
+      double mass = 0;
       std::uint64_t leaves = 0;
       int deepest = 0;
     };

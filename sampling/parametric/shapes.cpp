@@ -57,7 +57,8 @@ struct Plane {
 
 struct Sphere {
   static Product at(const Vector2d& uv) {
-    const Jet longitude = Jet::linear(uv.x(), 2 * kPi, 0), polar = Jet::linear(uv.y(), kPi, 0);
+    const Jet longitude = Jet::linear(uv.x(), 2 * kPi, 0);
+    const Jet polar = Jet::linear(uv.y(), kPi, 0);
     const Jet radius = sin(polar);
     return {{{cos(longitude), radius}, {sin(longitude), radius}, {kOne, cos(polar)}}};
   }
@@ -66,7 +67,8 @@ struct Sphere {
 /// z = 2 v - 1 and the circle's radius follows.
 struct EqualAreaSphere {
   static Product at(const Vector2d& uv) {
-    const Jet longitude = Jet::linear(uv.x(), 2 * kPi, 0), z = Jet::linear(uv.y(), 2, -1);
+    const Jet longitude = Jet::linear(uv.x(), 2 * kPi, 0);
+    const Jet z = Jet::linear(uv.y(), 2, -1);
     const double r = std::sqrt(std::max(0., 1 - z.value * z.value));
     const Jet radius = compose(r, -z.value / r, -1 / (r * r * r), z);
     return {{{cos(longitude), radius}, {sin(longitude), radius}, {kOne, z}}};
@@ -75,7 +77,8 @@ struct EqualAreaSphere {
 
 struct EightSurface {
   static Product at(const Vector2d& uv) {
-    const Jet turn = Jet::linear(uv.x(), 2 * kPi, 0), v = Jet::linear(uv.y(), kPi, -kPi / 2);
+    const Jet turn = Jet::linear(uv.x(), 2 * kPi, 0);
+    const Jet v = Jet::linear(uv.y(), kPi, -kPi / 2);
     const Jet radius = sin(2 * v);
     return {{{cos(turn), radius}, {sin(turn), radius}, {kOne, sin(v)}}};
   }
@@ -83,7 +86,8 @@ struct EightSurface {
 
 struct WhitneyUmbrella {
   static Product at(const Vector2d& uv) {
-    const Jet u = Jet::linear(uv.x(), 2, -1), v = Jet::linear(uv.y(), 2, -1);
+    const Jet u = Jet::linear(uv.x(), 2, -1);
+    const Jet v = Jet::linear(uv.y(), 2, -1);
     return {{{u, v}, {u, kOne}, {kOne, v * v}}};
   }
 };
@@ -96,7 +100,8 @@ struct RoundRoots {
 template <RoundRoots (*kRoots)(double quarters, double quarters_a_unit)>
 struct SuperEllipsoidOf {
   static Product at(const Vector2d& uv) {
-    const RoundRoots latitude = kRoots(2 * uv.x() - 1, 2), longitude = kRoots(4 * uv.y() - 2, 4);
+    const RoundRoots latitude = kRoots(2 * uv.x() - 1, 2);
+    const RoundRoots longitude = kRoots(4 * uv.y() - 2, 4);
     return {{{latitude.cosine, longitude.cosine}, {latitude.cosine, longitude.sine}, {latitude.sine, kOne}}};
   }
 };
@@ -113,7 +118,8 @@ RoundRoots smooth_roots(double quarters, double slope) {
   const double nearest = std::round(quarters);
   const Jet r{quarters - nearest, slope, 0};
   const Jet angle = 2 * kPi * (r * r * r);
-  const Jet sine = std::cbrt(2 * kPi) * (r * cube_root(sinc(angle))), cosine = cube_root(cos(angle));
+  const Jet sine = std::cbrt(2 * kPi) * (r * cube_root(sinc(angle)));
+  const Jet cosine = cube_root(cos(angle));
   switch (((static_cast<int>(nearest) % 4) + 4) % 4) {
     case 0:
       return {cosine, sine};

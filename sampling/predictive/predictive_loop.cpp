@@ -77,11 +77,13 @@ class Correction {
   double at(const TriangleFrame& frame, std::uint32_t triangle, const Vector2d& place) const {
     const AtlasLayout::Rectangle& r = layout_.rectangle(triangle);
     const Vector2d step = layout_.step_m(frame, triangle);
-    const double x = std::clamp(place.x() / step.x(), 0., r.columns - 1.),
-                 y = std::clamp(place.y() / step.y(), 0., r.rows - 1.);
-    const int column = std::min(static_cast<int>(x), r.columns - 2), row = std::min(static_cast<int>(y), r.rows - 2);
+    const double x = std::clamp(place.x() / step.x(), 0., r.columns - 1.);
+    const double y = std::clamp(place.y() / step.y(), 0., r.rows - 1.);
+    const int column = std::min(static_cast<int>(x), r.columns - 2);
+    const int row = std::min(static_cast<int>(y), r.rows - 2);
     const auto value = [&](int i, int j) { return values_[layout_.texel_index(r, column + i, row + j)]; };
-    const double right = x - column, up = y - row;
+    const double right = x - column;
+    const double up = y - row;
     return (1 - up) * ((1 - right) * value(0, 0) + right * value(1, 0)) +
            up * ((1 - right) * value(0, 1) + right * value(1, 1));
   }
@@ -146,7 +148,8 @@ class AskedTexels {
     const ToneField baked(asked_, {layout_, ToneLayer(layout_.width(), layout_.height(), texels_)});
     visit_triangles([&](std::uint32_t t) {
       const std::array<Vector2d, 3> whole{Vector2d(0, 0), Vector2d(1, 0), Vector2d(0, 1)};
-      const double mass = asked_.integrate(t, whole).mass, own = baked.integrate(t, whole).mass;
+      const double mass = asked_.integrate(t, whole).mass;
+      const double own = baked.integrate(t, whole).mass;
       if (!(own > 0)) return;
       const double scale = std::clamp(mass / own, 1 / kMaxRescaling, kMaxRescaling);
       visit_nodes(layout_, t, 1, [&](const TriangleFrame&, std::size_t texel, const Vector2d&, const BoxedPolygon&) {
@@ -173,7 +176,8 @@ std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const Triangl
     if (asked.asked(center) > 0) return center;
     const int axis = halving % 2;
     const double middle = .5 * (low[axis] + high[axis]);
-    Vector2d lower_high = high, upper_low = low;
+    Vector2d lower_high = high;
+    Vector2d upper_low = low;
     lower_high[axis] = upper_low[axis] = middle;
     const ToneIntegral lower = asked.integrate(triangle, frame.clip_box(low, lower_high).corners());
     const ToneIntegral upper = asked.integrate(triangle, frame.clip_box(upper_low, high).corners());

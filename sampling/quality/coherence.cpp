@@ -45,7 +45,8 @@ Vector2d peano_vertex(std::uint64_t index, int depth) {
 }
 
 Vector2d z_vertex(std::uint64_t index, int depth) {
-  std::uint64_t x = 0, y = 0;
+  std::uint64_t x = 0;
+  std::uint64_t y = 0;
   for (int level = 0; level < depth; ++level) {
     x |= (index >> (2 * level) & 1u) << level;
     y |= (index >> (2 * level + 1) & 1u) << level;
@@ -57,7 +58,8 @@ Vector2d z_vertex(std::uint64_t index, int depth) {
 /// Row by row, every second row backwards.
 Vector2d rows_vertex(std::uint64_t index, int depth) {
   const std::uint64_t side = std::uint64_t{1} << depth;
-  const std::uint64_t y = index / side, x = y % 2 == 0 ? index % side : side - 1 - index % side;
+  const std::uint64_t y = index / side;
+  const std::uint64_t x = y % 2 == 0 ? index % side : side - 1 - index % side;
   return Vector2d(static_cast<double>(x) + .5, static_cast<double>(y) + .5) / static_cast<double>(side);
 }
 

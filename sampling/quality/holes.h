@@ -33,7 +33,8 @@ struct SearchTriangle {
         longest = k;
       }
     const Eigen::Vector3d middle = (corners[longest] + corners[(longest + 1) % 3]) / 2;
-    SearchTriangle a = *this, b = *this;
+    SearchTriangle a = *this;
+    SearchTriangle b = *this;
     a.corners[(longest + 1) % 3] = middle;
     b.corners[longest] = middle;
     return {a, b};

@@ -62,13 +62,16 @@ Discrepancy measure_plane(const PointTree<2>& tree, PlaneShape shape, const Test
 
 /// On the unit sphere, uniform: equation 5.3.
 Vector3d random_direction(double u, double v) {
-  const double z = 2 * v - 1, r = std::sqrt(std::max(0., 1 - z * z)), turn = 2 * std::numbers::pi * u;
+  const double z = 2 * v - 1;
+  const double r = std::sqrt(std::max(0., 1 - z * z));
+  const double turn = 2 * std::numbers::pi * u;
   return {r * std::cos(turn), r * std::sin(turn), z};
 }
 
 double spherical_triangle_error(const PointTree<3>& tree, const ShapeNumbers& number) {
   const Vector3d a = random_direction(number(0), number(1));
-  Vector3d b = random_direction(number(2), number(3)), c = random_direction(number(4), number(5));
+  Vector3d b = random_direction(number(2), number(3));
+  Vector3d c = random_direction(number(4), number(5));
   double volume = a.dot(b.cross(c));
   if (volume < 0) {
     std::swap(b, c);
@@ -104,10 +107,15 @@ Discrepancy sphere_discrepancy(std::span<const Vector3d> directions, const TestS
 
 double log_log_slope(std::span<const double> counts, std::span<const double> values) {
   CHECK_EQ(counts.size(), values.size());
-  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  double n = 0;
+  double sx = 0;
+  double sy = 0;
+  double sxx = 0;
+  double sxy = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     if (!(counts[i] > 0) || !(values[i] > 0)) continue;
-    const double x = std::log(counts[i]), y = std::log(values[i]);
+    const double x = std::log(counts[i]);
+    const double y = std::log(values[i]);
     n += 1;
     sx += x;
     sy += y;

@@ -77,8 +77,10 @@ struct Axis {
       for (double e = std::ceil(low - 1e-9); e <= high + 1e-9; e += step) result.push_back(std::pow(10, e));
       return result;
     }
-    const double from = is_log ? std::pow(10, low) : low, to = is_log ? std::pow(10, high) : high;
-    const double rough = (to - from) / 6, power = std::pow(10, std::floor(std::log10(rough)));
+    const double from = is_log ? std::pow(10, low) : low;
+    const double to = is_log ? std::pow(10, high) : high;
+    const double rough = (to - from) / 6;
+    const double power = std::pow(10, std::floor(std::log10(rough)));
     const double step = power * (rough / power > 5 ? 10 : rough / power > 2 ? 5 : rough / power > 1 ? 2 : 1);
     for (double value = std::ceil(from / step - 1e-9) * step; value <= to + 1e-9 * step; value += step)
       result.push_back(std::abs(value) < 1e-9 * step ? 0 : value);
@@ -208,7 +210,8 @@ bool is_upper_half_full_on_the_right(const Plot& plot, const Axis& x, const Axis
 }  // namespace
 
 std::string svg_of(const Plot& plot) {
-  const Axis x = axis_of(plot, 0), y = axis_of(plot, 1);
+  const Axis x = axis_of(plot, 0);
+  const Axis y = axis_of(plot, 1);
   std::string svg = opening(kWidth, kHeight) + frame_of(plot, x, y);
   svg += "<clipPath id=\"frame\"><rect x=\"" + place(kLeftMargin - 2) + "\" y=\"" + place(kTopMargin - 2) +
          "\" width=\"" + place(kWidth - kLeftMargin - kRightMargin + 4) + "\" height=\"" +
@@ -235,7 +238,9 @@ std::string svg_of(const Plot& plot) {
 }
 
 std::string svg_of(std::span<const PointPicture> pictures, const std::string& title) {
-  constexpr double kSize = 360, kGap = 24, kHead = 56;
+  constexpr double kSize = 360;
+  constexpr double kGap = 24;
+  constexpr double kHead = 56;
   std::string svg = opening(kGap + static_cast<double>(pictures.size()) * (kSize + kGap), kSize + kHead + kGap);
   svg += text_at(kGap, 22, title, "font-size=\"15\"");
   for (std::size_t i = 0; i < pictures.size(); ++i)
@@ -244,7 +249,8 @@ std::string svg_of(std::span<const PointPicture> pictures, const std::string& ti
 }
 
 Vector2d project(const Eigen::Vector3d& p, double turn_deg, double height_deg) {
-  const double turn = turn_deg * std::numbers::pi / 180, height = height_deg * std::numbers::pi / 180;
+  const double turn = turn_deg * std::numbers::pi / 180;
+  const double height = height_deg * std::numbers::pi / 180;
   const double x = -std::sin(turn) * p.x() + std::cos(turn) * p.y();
   const double depth = std::cos(turn) * p.x() + std::sin(turn) * p.y();
   return {x, std::cos(height) * p.z() - std::sin(height) * depth};

@@ -61,7 +61,8 @@ std::vector<double> spread(std::span<const Eigen::Vector2d> points, std::size_t 
 }  // namespace
 
 PointTransform::PointTransform(std::span<const Eigen::Vector2d> points, int highest) : highest_(highest) {
-  const auto column_count = static_cast<std::size_t>(highest) + 1, row_count = 2 * column_count - 1;
+  const auto column_count = static_cast<std::size_t>(highest) + 1;
+  const auto row_count = 2 * column_count - 1;
   const std::size_t size = std::bit_ceil(std::max<std::size_t>(2 * row_count, 16));
   const std::vector<double> grid = spread(points, size);
 

@@ -48,7 +48,8 @@ double log_log_slope(std::span<const double> counts, std::span<const double> val
 
 /// Distances to the nearest neighbor, over that of the densest packing, sqrt(2 A / (sqrt(3) N)).
 struct Spacing {
-  double smallest = 0, mean = 0;
+  double smallest = 0;
+  double mean = 0;
   double spread = 0;              ///< standard deviation over mean
   std::vector<double> distances;  ///< one for each point, in rising order
 };

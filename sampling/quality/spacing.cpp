@@ -44,7 +44,8 @@ Spacing spacing_figures(std::vector<double> distances) {
   Spacing result;
   if (distances.empty()) return result;
   const auto n = static_cast<double>(distances.size());
-  double sum = 0, squares = 0;
+  double sum = 0;
+  double squares = 0;
   for (const double distance : distances) sum += distance;
   result.smallest = distances.front();
   result.mean = sum / n;

@@ -48,13 +48,16 @@ double disc_side_area(double radius, const Vector2d& a, const Vector2d& b) {
   };
   if (a.squaredNorm() <= radius2 && b.squaredNorm() <= radius2) return .5 * cross(a, b);
   const Vector2d d = b - a;
-  const double half_b = a.dot(d), dd = d.squaredNorm();
+  const double half_b = a.dot(d);
+  const double dd = d.squaredNorm();
   const double discriminant = half_b * half_b - dd * (a.squaredNorm() - radius2);
   if (!(discriminant > 0) || !(dd > 0)) return sector(a, b);
   const double root = std::sqrt(discriminant);
-  const double in = std::clamp((-half_b - root) / dd, 0., 1.), out = std::clamp((-half_b + root) / dd, 0., 1.);
+  const double in = std::clamp((-half_b - root) / dd, 0., 1.);
+  const double out = std::clamp((-half_b + root) / dd, 0., 1.);
   if (!(out > in)) return sector(a, b);
-  const Vector2d p = a + in * d, q = a + out * d;
+  const Vector2d p = a + in * d;
+  const Vector2d q = a + out * d;
   return (in > 0 ? sector(a, p) : 0) + .5 * cross(p, q) + (out < 1 ? sector(q, b) : 0);
 }
 
@@ -73,7 +76,8 @@ std::vector<Vector2d> clip(const std::vector<Vector2d>& polygon, const Vector2d&
   std::vector<Vector2d> kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    const double at_a = inward.dot(a - p), at_b = inward.dot(b - p);
+    const double at_a = inward.dot(a - p);
+    const double at_b = inward.dot(b - p);
     if (at_a >= 0) kept.push_back(a);
     if ((at_a > 0 && at_b < 0) || (at_a < 0 && at_b > 0)) kept.push_back(a + at_a / (at_a - at_b) * (b - a));
   }

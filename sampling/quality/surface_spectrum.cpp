@@ -145,7 +145,8 @@ class PatchMaker {
     if (length > kMaxPiecePitches * pitch) {
       if ((middle - plane.center()).norm() - length > kRadius * pitch) return;
       const Vector3d half = (corners[longest] + corners[(longest + 1) % 3]) / 2;
-      std::array<Vector3d, 3> a = corners, b = corners;
+      std::array<Vector3d, 3> a = corners;
+      std::array<Vector3d, 3> b = corners;
       a[(longest + 1) % 3] = half;
       b[longest] = half;
       add_even(t, a, plane, pitch, patch);
@@ -173,7 +174,8 @@ std::array<std::complex<double>, kRings> transform(const Eigen::Matrix2Xd& place
                                                    const Vector2d& direction) {
   constexpr double kStep = SpectrumSums::kHighest / kRings;
   const Eigen::ArrayXd turns = -2 * std::numbers::pi * kStep * (direction.transpose() * places).array().transpose();
-  const Eigen::ArrayXd step_x = turns.cos(), step_y = turns.sin();
+  const Eigen::ArrayXd step_x = turns.cos();
+  const Eigen::ArrayXd step_y = turns.sin();
   Eigen::ArrayXd x = weights * (turns / 2).cos(), y = weights * (turns / 2).sin(), next_x;
   std::array<std::complex<double>, kRings> sums;
   for (auto& sum : sums) {

@@ -50,7 +50,8 @@ void TriangleTree::build(std::span<const double> masses, std::size_t node, std::
     std::nth_element(order_.begin() + static_cast<std::ptrdiff_t>(begin),
                      order_.begin() + static_cast<std::ptrdiff_t>(middle),
                      order_.begin() + static_cast<std::ptrdiff_t>(end), [&](std::uint32_t a, std::uint32_t b) {
-                       const double ka = key(a), kb = key(b);
+                       const double ka = key(a);
+                       const double kb = key(b);
                        return ka < kb || (ka == kb && a < b);
                      });
   }
