@@ -113,7 +113,7 @@ void run(const TexturedMesh& mesh, std::size_t dots, Stages& stages, bool is_las
   const Neighbors neighbors = stages.time("1 neighbors", [&] { return find_neighbors(mesh.triangles); });
   const auto components = stages.time("2 components", [&] { return find_components(mesh, neighbors); });
   for (const Component& component : components) {
-    auto cut = stages.time("3 cut", [&] { return cut_to_disk(mesh, neighbors, component).cut; });
+    auto cut = stages.time("3 cut", [&] { return cut_to_disk(mesh, neighbors, component); });
     if (cut) stages.time("4 map", [&] { return map_to_square(*cut); });
   }
   stages.finish_repeat();

@@ -74,8 +74,8 @@ int main(int argc, char** argv) {
       const double begin = cpu_s();
       const Neighbors neighbors = find_neighbors(mesh.triangles);
       const auto components = find_components(mesh, neighbors);
-      auto [cut, reason] = cut_to_disk(mesh, neighbors, components.at(0));
-      if (!cut) throw std::runtime_error(reason);
+      auto cut = cut_to_disk(mesh, neighbors, components.at(0));
+      if (!cut) throw std::runtime_error(cut.reason());
       const double cut_s = cpu_s() - begin;
       const RivalMesh same = rival_mesh(cut->disk);
       const double before_map = cpu_s();
