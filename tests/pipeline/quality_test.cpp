@@ -6,9 +6,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "config/cell_file.h"
+#include "config/job_settings.h"
 #include "config/json_reader.h"
 #include "sampling/base/input_error.h"
 #include "sampling/dots/dots_file.h"
+#include "tests/pipeline/painting.h"
 #include "tests/support/temporary_folder.h"
 
 /// What `hilbrush-pipeline quality` does, from a request to figures and plots.
@@ -130,6 +133,21 @@ TEST_F(Quality, DotsOfAFileAreHeldAgainstTheirModel) {
   for (Dot& dot : sequence.dots) dot.position_O.x() += .01;
   write_dots(sequence, reasons, names, file);
   EXPECT_NE(refusal(request("")).find("dots do not lie on it"), std::string::npos);
+}
+
+TEST_F(Quality, ATexturedModelIsMeasuredByItsTone) {
+  // Balls of many dots have outlines of 64 corners and more, which a texture integrates in pieces.
+  const std::string model = testing_pipeline::test_data("letter_cube.wrl").string();
+  const Json json = run(R"({"set":")" + model + R"(","density":"texture","count":[4000]})");
+  EXPECT_EQ(figure(json, "/sizes/0/count"), 4000);
+  EXPECT_GT(figure(json, "/sizes/0/discrepancy/balls/rms"), 0);
+  EXPECT_LT(figure(json, "/sizes/0/discrepancy/balls/rms"), 1.5e-3) << "5e-4; of random dots 5e-3";
+  expect_files(json);
+
+  run_dry_run({model, job_settings_from_json(R"({"size_mm":20,"dpi":50})"), find_cell("default"), output_}, {});
+  const std::string request = R"({"set":")" + (output_ / "dots.ply").string() + R"(","model":")" + model +
+                              R"(","settings":"{\"size_mm\":20,\"dpi\":50}"})";
+  EXPECT_LT(figure(run(request), "/sizes/0/discrepancy/balls/rms"), 2e-2);
 }
 
 TEST_F(Quality, RequestsThatMakeNoSenseAreRefused) {
