@@ -2,11 +2,13 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "daemon/pipeline/quality/quality.h"
 #include "sampling/dots/dots.h"
+#include "sampling/options/sample_options.h"
 #include "sampling/parametric/parametric.h"
 #include "sampling/quality/quality.h"
 
@@ -47,6 +49,11 @@ Enum choice_in(const EnumName<Enum> (&names)[kCount], const std::string& name, E
                const std::string& path) {
   return name.empty() ? otherwise : names[choice_of(name, all_names(names), 0, path)].value;
 }
+
+/// The sampler of `choices` called `name`, or the first if it is empty. @throws InputError at $.sampler.
+Sampler sampler_choice(const std::string& name, std::span<const Sampler> choices);
+/// The space-filling curve called `name`, or Hilbert's if it is empty. @throws InputError at $.curve.
+CurveKind curve_choice(const std::string& name);
 
 std::unique_ptr<MeasuredSet> make_parametric_set(const QualityRequest& request, ParametricShape shape);
 std::unique_ptr<MeasuredSet> make_model_set(const QualityRequest& request);

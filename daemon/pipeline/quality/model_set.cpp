@@ -1,3 +1,5 @@
+#include <array>
+
 #include "config/cell_file.h"
 #include "config/job_settings.h"
 #include "daemon/pipeline/job_sampling.h"
@@ -27,6 +29,11 @@ DensitySource source_of(std::size_t density) {
                         : DensitySource::kTexture;
 }
 
+/// All but "fine", which places the dots of a picture, not of a density.
+constexpr std::array kSamplers{Sampler::kCentroid, Sampler::kJittered,     Sampler::kEven,
+                               Sampler::kRandom,   Sampler::kHalton,       Sampler::kHammersley,
+                               Sampler::kSobol,    Sampler::kNiederreiter, Sampler::kBlue};
+
 /// The same surface, black all over.
 TexturedMesh blackened(TexturedMesh mesh) {
   for (auto& luminance : mesh.corner_luminance) luminance = {0, 0, 0};
@@ -42,16 +49,12 @@ class ModelSet : public MeasuredSet {
       : density_(choice_of(request.density, kDensities, kConstant, "$.density")),
         mesh_(load(request.set, density_)),
         tone_(mesh_, {}),
-        curve_(mesh_, choice_of(request.curve, {"hilbert", "peano2"}, 0, "$.curve") == 0 ? CurveKind::kHilbert
-                                                                                         : CurveKind::kPeano2),
+        curve_(mesh_, curve_choice(request.curve)),
         surface_(mesh_, density_ == kConstant ? nullptr : &tone_) {
     kind = "model";
     if (!request.area.empty()) throw InputError("$.area", "is for formulas only: a mesh's areas are exact");
     if (!request.points.empty()) throw InputError("$.points", "is for the plane and the sphere only");
-    std::vector<std::string> names;
-    for (int s = 0; s <= static_cast<int>(Sampler::kBlue); ++s)
-      names.emplace_back(sampler_name(static_cast<Sampler>(s)));
-    options_.sampler = static_cast<Sampler>(choice_of(request.sampler, names, 0, "$.sampler"));
+    options_.sampler = sampler_choice(request.sampler, kSamplers);
     options_.seed = request.seed;
     if (density_ != kConstant)
       notes.emplace_back(

@@ -12,6 +12,10 @@ namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
+/// Those that place dots along a curve on their own; "blue" and "fine" need a mesh.
+constexpr std::array kSamplers{Sampler::kCentroid, Sampler::kJittered,   Sampler::kEven,  Sampler::kRandom,
+                               Sampler::kHalton,   Sampler::kHammersley, Sampler::kSobol, Sampler::kNiederreiter};
+
 /// The surface as triangles, `side` by `side` quads.
 TexturedMesh triangles_of(const ParametricSurface& surface, int side) {
   TexturedMesh mesh;
@@ -36,9 +40,8 @@ class ParametricSet : public MeasuredSet {
  public:
   ParametricSet(const QualityRequest& request, ParametricShape shape) : shape_(shape), formula_(make_surface(shape)) {
     kind = "surface";
-    options_.sampler = request.sampler.empty() ? Sampler::kCentroid : sampler_named(request.sampler);
-    options_.curve =
-        choice_of(request.curve, {"hilbert", "peano2"}, 0, "$.curve") == 0 ? CurveKind::kHilbert : CurveKind::kPeano2;
+    options_.sampler = sampler_choice(request.sampler, kSamplers);
+    options_.curve = curve_choice(request.curve);
     options_.area = choice_in(kAreaMethodNames, request.area, AreaMethod::kFirstFundamentalForm, "$.area");
     options_.density = choice_in(kParametricDensityNames, request.density, ParametricDensity::kConstant, "$.density");
     options_.seed = request.seed;
@@ -79,13 +82,6 @@ class ParametricSet : public MeasuredSet {
   std::vector<std::uint64_t> default_counts() const override { return {10'000}; }
 
  private:
-  static Sampler sampler_named(const std::string& name) {
-    std::vector<std::string> names;
-    for (int s = 0; s <= static_cast<int>(Sampler::kNiederreiter); ++s)
-      names.emplace_back(sampler_name(static_cast<Sampler>(s)));
-    return static_cast<Sampler>(choice_of(name, names, 0, "$.sampler"));
-  }
-
   bool is_sphere() const { return shape_ == ParametricShape::kSphere || shape_ == ParametricShape::kEqualAreaSphere; }
 
   void use_point_set(const QualityRequest& request) {

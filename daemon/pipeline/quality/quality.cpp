@@ -1,6 +1,7 @@
 #include "daemon/pipeline/quality/quality.h"
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "config/json_reader.h"
@@ -143,6 +144,17 @@ std::size_t choice_of(const std::string& name, const std::vector<std::string>& n
   for (std::size_t i = 0; i < names.size(); ++i)
     known += (i == 0 ? "" : i + 1 == names.size() ? " or " : ", ") + ("\"" + names[i] + "\"");
   throw InputError(path, "expected " + known + ", found \"" + name + "\"");
+}
+
+Sampler sampler_choice(const std::string& name, std::span<const Sampler> choices) {
+  std::vector<std::string> names;
+  for (const Sampler sampler : choices) names.emplace_back(sampler_name(sampler));
+  return choices[choice_of(name, names, 0, "$.sampler")];
+}
+
+CurveKind curve_choice(const std::string& name) {
+  constexpr std::array kCurves{CurveKind::kHilbert, CurveKind::kPeano2};
+  return kCurves[choice_of(name, {curve_name(kCurves[0]), curve_name(kCurves[1])}, 0, "$.curve")];
 }
 
 }  // namespace hilbrush
