@@ -31,7 +31,7 @@ std::vector<SkippedFigures> skipped_figures(const std::vector<SkippedDot>& skipp
     figures.reason = skip_reason_name(key.first);
     figures.what = key.second.empty() ? dots.front()->detail : std::string(key.second);
     figures.count = dots.size();
-    if (!key.second.empty()) {
+    if (dots.front()->measure != SkipMeasure::kNone) {
       const SkipMeasure measure = dots.front()->measure;
       const bool is_angle = measure == SkipMeasure::kExcessAngle;
       std::sort(dots.begin(), dots.end(),

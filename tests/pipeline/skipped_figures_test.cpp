@@ -34,6 +34,8 @@ TEST(SkippedFigures, WithoutAmountsTheSentenceStands) {
   ASSERT_EQ(figures.size(), 1u);
   EXPECT_EQ(figures[0].text, "the laser cannot");
   EXPECT_TRUE(figures[0].unit.empty());
+  energy.what = "the laser cannot deliver the energy";
+  EXPECT_EQ(skipped_figures({energy})[0].text, "the laser cannot deliver the energy") << "no amount of 0 mm";
   EXPECT_TRUE(skipped_figures({}).empty());
 }
 
