@@ -41,9 +41,9 @@ TEST(AccessTest, WithoutRulesWhoeverOpensTheSocketMayOperate) {
 }
 
 TEST(AccessTest, WithRulesOnlyThoseNamedAndRootAndTheDaemonsOwnUserMay) {
-  const Access access(with_rules({{"nobody", "", true}, {"", "daemon", false}}));
-  const auto nobody = *::getpwnam("nobody");
-  EXPECT_TRUE(access.local_peer(nobody.pw_uid, nobody.pw_gid, 1, {}).may_operate);
+  const Access access(with_rules({{"bin", "", true}, {"", "daemon", false}}));
+  const auto bin = *::getpwnam("bin");
+  EXPECT_TRUE(access.local_peer(bin.pw_uid, bin.pw_gid, 1, {}).may_operate);
   const gid_t group = ::getgrnam("daemon")->gr_gid;
   const Peer by_first_group = access.local_peer(kStranger, group, 1, {});
   EXPECT_TRUE(by_first_group.may_look);
@@ -64,12 +64,12 @@ TEST(AccessTest, UnknownNamesAreRefusedWithTheirPlace) {
 }
 
 TEST(AccessTest, ATokenIsAUser) {
-  DaemonSettings settings = with_rules({{"nobody", "", false}});
-  settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{"nobody", sha256_hex("secret")}}};
+  DaemonSettings settings = with_rules({{"bin", "", false}});
+  settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{"bin", sha256_hex("secret")}}};
   const Access access(settings);
   const auto peer = access.token_peer("secret", "10.0.0.1:99");
   ASSERT_TRUE(peer);
-  EXPECT_EQ(peer->user, "nobody");
+  EXPECT_EQ(peer->user, "bin");
   EXPECT_EQ(peer->address, "10.0.0.1:99");
   EXPECT_TRUE(peer->may_look);
   EXPECT_FALSE(peer->may_operate) << "the rules hold for tokens, too";
@@ -125,8 +125,8 @@ TEST(ServerTcpTest, ATakenPortIsASentence) {
 /// Observers are found by their credentials; a token of a user who may only look stands for one here.
 TEST(ServerTcpTest, WhoMayOnlyLookMayAlsoStop) {
   DaemonWorld world;
-  world.options.settings = with_rules({{"nobody", "", false}});
-  world.options.settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{"nobody", sha256_hex("look")}}};
+  world.options.settings = with_rules({{"bin", "", false}});
+  world.options.settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{"bin", sha256_hex("look")}}};
   world.begin();
   LineClient mine = world.client();
   const auto id = world.submit(mine, world.model("cup.wrl"), "ready");
@@ -141,7 +141,7 @@ TEST(ServerTcpTest, WhoMayOnlyLookMayAlsoStop) {
   EXPECT_EQ(client->error_code("job.submit", {{"model", "/cup.wrl"}}), kRpcNotPermitted);
   world.clear_and_arm(mine);
   EXPECT_EQ(client->result("cell.stop").at("cell").at("state"), "stopped");
-  EXPECT_EQ(mine.result("cell.status").at("cell").at("reason"), "stopped by nobody");
+  EXPECT_EQ(mine.result("cell.status").at("cell").at("reason"), "stopped by bin");
 }
 
 }  // namespace
