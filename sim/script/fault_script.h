@@ -16,15 +16,17 @@ inline constexpr std::array<const char*, 3> kWireDeviceNames{"robot", "table", "
 
 enum class WireFaultKind {
   // Of one exchange: the next message after the trigger.
-  kLostRequest,        ///< not obeyed, not answered
-  kSilence,            ///< obeyed, but the answer is lost
-  kHalfFrame,          ///< the answer ends in its middle
-  kWrongId,            ///< the answer is another exchange's
-  kWrongChecksum,      ///< damaged on the way (Modbus RTU); elsewhere a byte of the answer is another
-  kException,          ///< the device says that it failed, and does nothing
-  kRefused,            ///< the device says no, and does nothing
-  kLateAnswer,         ///< obeyed at once, answered duration_s later
-  kDroppedConnection,  ///< closed instead of answered; a serial line goes silent for duration_s
+  kLostRequest,    ///< not obeyed, not answered
+  kSilence,        ///< obeyed, but the answer is lost
+  kHalfFrame,      ///< the answer ends in its middle
+  kWrongId,        ///< the answer is another exchange's
+  kWrongChecksum,  ///< damaged on the way (Modbus RTU); elsewhere a byte of the answer is another
+  kException,      ///< the device says that it failed, and does nothing
+  kRefused,        ///< the device says no, and does nothing
+  kLateAnswer,     ///< obeyed at once, answered duration_s later
+  /// Closed instead of answered; with a trigger of at_s alone, all connections of the device are closed at that time,
+  /// whether or not a message comes. A serial line goes silent for duration_s.
+  kDroppedConnection,
   // Of the device, for duration_s.
   kStaleInPosition,  ///< reports the state from before the fault: at rest, in position
   kDeviceAlarm,      ///< the robot or table stops and reports a fault until it is cleared

@@ -65,10 +65,22 @@ void FaultInjector::observe() {
   }
 }
 
+/// A device at rest gets no messages that its connection could be dropped at: by time alone, all are cut at once.
+bool FaultInjector::cut_connections(const WireFault& fault) {
+  const FaultTrigger& trigger = fault.trigger;
+  if (fault.kind != WireFaultKind::kDroppedConnection || !trigger.at_s || trigger.at_message || trigger.phase)
+    return false;
+  ++cuts_[static_cast<std::size_t>(fault.device)];
+  set_line_down(fault.device, fault.duration_s);
+  return true;
+}
+
 void FaultInjector::begin(const WireFault& fault) {
   ++begun_count_;
   if (is_of_exchange(fault.kind)) {
-    of_exchange_.push_back(fault);
+    WireFault rest = fault;
+    if (cut_connections(fault)) --rest.messages;
+    if (rest.messages > 0) of_exchange_.push_back(rest);
     return;
   }
   switch (fault.kind) {

@@ -7,8 +7,8 @@
 #include "sim/script/fault_script.h"
 #include "sim/wire/true_cell.h"
 
-/// Makes a fault script happen: told of every message and of time, it says what becomes of an exchange, and acts on the
-/// cell. One thread, the cell's.
+/// Makes a fault script happen: it is called for every message and as time passes, decides what happens to an exchange,
+/// and acts on the cell. One thread, the cell's.
 namespace hilbrush {
 
 class FaultInjector {
@@ -30,6 +30,8 @@ class FaultInjector {
   /// A serial line that is down.
   bool is_line_down(WireDevice device) const { return lasts(WireFaultKind::kDroppedConnection, device); }
   void set_line_down(WireDevice device, double duration_s);
+  /// How often all connections of the device were cut at once: sessions that began before the last time are over.
+  std::uint64_t cut_count(WireDevice device) const { return cuts_[static_cast<std::size_t>(device)]; }
   double next_event_s() const;
   std::uint64_t begun_count() const { return begun_count_; }
   std::uint64_t message_count(WireDevice device) const { return messages_[static_cast<std::size_t>(device)]; }
@@ -46,6 +48,7 @@ class FaultInjector {
   };
   bool lasts(WireFaultKind kind, WireDevice device) const;
   bool is_due(const Waiting& waiting) const;
+  bool cut_connections(const WireFault& fault);
   void begin(const WireFault& fault);
   void end(const WireFault& fault);
 
@@ -55,6 +58,7 @@ class FaultInjector {
   std::vector<WireFault> of_exchange_;  ///< begun, and not yet met by enough messages
   std::vector<Lasting> lasting_;
   std::array<std::uint64_t, 3> messages_{};
+  std::array<std::uint64_t, 3> cuts_{};
   std::array<std::uint64_t, 4> phases_{};
   CellPhase phase_ = CellPhase::kSettled;
   std::uint64_t begun_count_ = 0;

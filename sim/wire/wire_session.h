@@ -17,7 +17,7 @@ class WireSession {
   static constexpr std::size_t kMaxMessage = 1024;
 
   WireSession(WireDevice device, TrueCell& cell, FaultInjector& faults)
-      : cell_(cell), faults_(faults), device_(device) {}
+      : cell_(cell), faults_(faults), device_(device), cuts_before_(faults.cut_count(device)) {}
   virtual ~WireSession() = default;
   WireSession(const WireSession&) = delete;
   WireSession& operator=(const WireSession&) = delete;
@@ -30,7 +30,7 @@ class WireSession {
   /// All that is to be sent by now; taken away.
   std::string take_output();
   /// The device has closed the connection (what is still to be sent is lost). A serial line stays as it is.
-  bool is_dropped() const { return is_dropped_; }
+  bool is_dropped() const { return is_dropped_ || faults_.cut_count(device_) != cuts_before_; }
   WireDevice device() const { return device_; }
 
  protected:
@@ -57,6 +57,7 @@ class WireSession {
   void take_message(std::string_view message);
 
   const WireDevice device_;
+  const std::uint64_t cuts_before_;  ///< the device's, when the session began
   std::string input_;
   std::deque<Output> output_;  ///< in the order of sending; a late one holds up what follows
   bool is_dropped_ = false;

@@ -113,11 +113,7 @@ TEST_P(WiredAxes, RefuseWhatIsOutsideTheirLimits) {
 
 TEST_P(WiredAxes, AnAlarmIsAFaultThatCanBeCleared) {
   WiredCell::make_ready(*table);
-  WireFault fault;
-  fault.kind = WireFaultKind::kDeviceAlarm;
-  fault.device = WireDevice::kTable;
-  fault.trigger.at_s = cell.wire.now_s();
-  cell.wire.add_fault(fault);
+  cell.begin_fault(WireFaultKind::kDeviceAlarm, WireDevice::kTable);
   ASSERT_TRUE(cell.wait_for([&] { return table->status().state == DeviceState::kFault; }));
   EXPECT_FALSE(table->status().fault.empty());
   cell.wire.clear_faults();
@@ -128,12 +124,8 @@ TEST_P(WiredAxes, AnAlarmIsAFaultThatCanBeCleared) {
   move({.1, .3});
 }
 
-TEST_P(WiredAxes, AnAlarmFromBeforeIsToldAtOnceAndCanBeCleared) {
-  WireFault fault;
-  fault.kind = WireFaultKind::kDeviceAlarm;
-  fault.device = WireDevice::kTable;
-  fault.trigger.at_s = cell.wire.now_s();
-  cell.wire.add_fault(fault);
+TEST_P(WiredAxes, AnAlarmFromBeforeIsReportedAtOnceAndCanBeCleared) {
+  cell.begin_fault(WireFaultKind::kDeviceAlarm, WireDevice::kTable);
   EXPECT_THROW(table->connect(), DriverError);
   EXPECT_EQ(table->status().state, DeviceState::kFault);
   table->clear_fault();
@@ -144,11 +136,7 @@ TEST_P(WiredAxes, AnAlarmFromBeforeIsToldAtOnceAndCanBeCleared) {
 
 TEST_P(WiredAxes, ALostConnectionIsAFaultThatCanBeCleared) {
   WiredCell::make_ready(*table);
-  WireFault fault;
-  fault.kind = WireFaultKind::kDroppedConnection;
-  fault.device = WireDevice::kTable;
-  fault.trigger.at_s = cell.wire.now_s();
-  cell.wire.add_fault(fault);
+  cell.begin_fault(WireFaultKind::kDroppedConnection, WireDevice::kTable);
   ASSERT_TRUE(cell.wait_for([&] { return table->status().state == DeviceState::kFault; }));
   EXPECT_NE(table->status().fault.find("last messages"), std::string::npos) << table->status().fault;
   cell.wire.clear_faults();

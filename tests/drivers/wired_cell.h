@@ -89,6 +89,15 @@ class WiredCell {
     axes.enable();
     axes.home();
   }
+  /// Begins now, whatever the device is doing.
+  void begin_fault(WireFaultKind kind, WireDevice device, double duration_s = WireFault{}.duration_s) {
+    WireFault fault;
+    fault.kind = kind;
+    fault.device = device;
+    fault.trigger.at_s = wire.now_s();
+    fault.duration_s = duration_s;
+    wire.add_fault(fault);
+  }
   /// Waits on the cell's clock as the executor does; false after `cell_s`.
   template <class Condition>
   bool wait_for(Condition condition, double cell_s = 20) {

@@ -19,12 +19,7 @@ class WiredRobot : public testing::Test {
     return target;
   }
   void order(const WireFaultKind kind, double duration_s = 60) {
-    WireFault fault;
-    fault.kind = kind;
-    fault.device = WireDevice::kRobot;
-    fault.trigger.at_s = cell.wire.now_s();
-    fault.duration_s = duration_s;
-    cell.wire.add_fault(fault);
+    cell.begin_fault(kind, WireDevice::kRobot, duration_s);
   }
   bool is_robot_moving() {
     bool is_moving = false;
@@ -95,7 +90,12 @@ TEST_F(WiredRobot, AnAlarmIsAFaultThatCanBeCleared) {
 }
 
 TEST_F(WiredRobot, ALostLinkIsAFaultThatSaysWhatWasSaidLast) {
-  order(WireFaultKind::kDroppedConnection);
+  WireFault fault;
+  fault.kind = WireFaultKind::kDroppedConnection;
+  fault.device = WireDevice::kRobot;
+  fault.trigger.at_message = cell.wire.message_count(WireDevice::kRobot) + 1;
+  fault.duration_s = 60;
+  cell.wire.add_fault(fault);
   EXPECT_THROW(
       {
         for (int i = 0; i < 3; ++i) cell.robot->move_to(beside(.01 * i), .02);
@@ -103,6 +103,18 @@ TEST_F(WiredRobot, ALostLinkIsAFaultThatSaysWhatWasSaidLast) {
       DriverError);
   ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().state == DeviceState::kFault; }));
   EXPECT_NE(cell.robot->status().fault.find("last messages: "), std::string::npos) << cell.robot->status().fault;
+}
+
+TEST_F(WiredRobot, ALinkThatIsLostAtRestIsAFaultThatCanBeCleared) {
+  order(WireFaultKind::kDroppedConnection);
+  ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().state == DeviceState::kFault; }, 2));
+  EXPECT_NE(cell.robot->status().fault.find("hung up"), std::string::npos) << cell.robot->status().fault;
+  cell.wire.clear_faults();
+  cell.robot->clear_fault();
+  cell.robot->enable();
+  cell.robot->home();
+  cell.robot->move_to(home, .02);
+  EXPECT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
 }
 
 TEST_F(WiredRobot, APulseNeedsARobotInPosition) {
