@@ -15,7 +15,7 @@ namespace hilbrush {
 namespace {
 
 constexpr std::size_t kSkippedSample = 150, kReachedSample = 150;
-/// A trial has to help this share of the skipped dots, and this share of all dots.
+/// A trial must reach this share of the skipped dots, and gain this share of all dots.
 constexpr double kMinHelped = .2, kMinGain = 5e-4;
 constexpr double kHeightFactors[] = {.5};
 constexpr double kHeightStepsM[] = {.02, .04, .08};
@@ -53,8 +53,8 @@ Sample choose_sample(const DotSequence& dots, const std::vector<SkippedDot>& ski
   return {sample(helpable, kSkippedSample, random), sample(reached, kReachedSample, random), helpable.size()};
 }
 
-/// From where the object stands to where it would stand on the other axis: taken off the fixture, laid over, centered,
-/// and mounted as before.
+/// From the present position of the object to that on the other axis: taken off the fixture, turned over, centered, and
+/// mounted as before.
 Eigen::Isometry3d lay_over(const TexturedMesh& mesh, const Standing& standing) {
   using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
   const auto& offset = standing.mounting.offset_m;

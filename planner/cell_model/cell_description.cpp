@@ -28,7 +28,8 @@ double painted_coverage(PaintResponse response, double x) {
       return 1 - std::exp(-3 * x);
     case PaintResponse::kSigmoid: {
       // A Hill curve: half covered at half the full dose, slope 2 there, 94 % at the full dose.
-      const double x2 = x * x, half2 = .25;
+      const double x2 = x * x;
+      const double half2 = .25;
       return x2 * x2 / (x2 * x2 + half2 * half2);
     }
   }

@@ -35,10 +35,10 @@ struct AxisDescription {
   double acceleration_max = 0;   ///< rad/s2 or m/s2
   double settle_saturation = 0;  ///< the move at which settling takes longest, rad or m
   double home = 0;               ///< where homing ends
-  double time_factor = 1;        ///< what its moves were measured to take, over what speed and acceleration promise
+  double time_factor = 1;        ///< measured duration of its moves over that by speed_max and acceleration_max
 };
 
-/// How paint answers to x = dose / full dose; coverage in 0..1.
+/// How paint responds to x = dose / full dose; coverage in 0..1.
 enum class PaintResponse {
   kLinear,      ///< min(x, 1)
   kSaturating,  ///< 1 - exp(-3 x)
@@ -49,7 +49,7 @@ enum class PaintResponse {
 struct ToneCurveEntry {
   std::string sampler, curve = "hilbert";  ///< the placement's names, as in a job's settings
   int levels = 1;                          ///< energies of the dots
-  std::optional<double> spot_pitches;      ///< the spot's 1/e2 diameter, if it matters to say
+  std::optional<double> spot_pitches;      ///< the spot's 1/e2 diameter, where it matters
   std::vector<double> wanted, asked;
 };
 
@@ -104,11 +104,11 @@ struct CellDescription {
   } paint;
   struct Timing {
     double tick_s = 0;  ///< control tick
-    double settle_min_s = 0,
-           settle_max_s = 0;  ///< settle = min + (max - min) * min(1, largest move / settle_saturation)
+    double settle_min_s = 0;
+    double settle_max_s = 0;  ///< settle = min + (max - min) * min(1, largest move / settle_saturation)
     double retract_s = 0;     ///< backing off and coming back around a re-pose
-    double message_s = 0;     ///< what one exchange with the devices costs
-    double move_delay_s = 0;  ///< what each move was measured to take longer
+    double message_s = 0;     ///< duration of one exchange with the devices
+    double move_delay_s = 0;  ///< measured, added to each move
   } timing;
   struct Simulation {
     double time_scale = 0;  ///< wall seconds of one cell second: 1 real time, 0 virtual (as fast as possible)

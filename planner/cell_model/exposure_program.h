@@ -8,11 +8,11 @@
 
 #include "planner/cell_model/cell_description.h"
 
-/// What planning makes and the executor runs: exposures in order, and the way-points of the moves between them.
+/// The result of planning, which the executor runs: exposures in order, and the way-points of the moves between them.
 namespace hilbrush {
 
 struct Exposure {
-  Eigen::Vector3d position_O = Eigen::Vector3d::Zero();  ///< where the beam shall land, m
+  Eigen::Vector3d position_O = Eigen::Vector3d::Zero();  ///< where the beam is to land, m
   Eigen::Vector3f normal_O = Eigen::Vector3f::Zero();    ///< of the face there
   float tone = 0;                                        ///< wanted coverage, 0..1
   float energy_j = 0;                                    ///< = power_w * pulse_s
@@ -23,7 +23,7 @@ struct Exposure {
 };
 
 /// A way-point passed (at rest, laser off) before `before_exposure`; several in order of appearance. before_exposure ==
-/// exposures.size(): the way home.
+/// exposures.size(): on the path home.
 struct Via {
   std::uint32_t before_exposure = 0;
   Joints joints{};

@@ -6,7 +6,7 @@
 /// Settings of planning, and the names of their choices: plain values, so that config/ can read them.
 namespace hilbrush {
 
-/// What a plan is to be good at.
+/// What a plan is optimized for.
 enum class Planning {
   kQuality,   ///< beams nearest to the normals, for a few per cent more painting time
   kBalanced,  ///< default
@@ -41,7 +41,8 @@ inline const char* order_name(DotOrder order) {
 /// How poses follow from dots.
 enum class PosePolicy {
   kSearch,       ///< many dots share a pose of the table
-  kFollowNormal  ///< the baseline: dots as they come, the table turned for each so that the beam meets it head-on
+  kFollowNormal  ///< the baseline: dots as they come, the table turned for each so that the beam meets it along the
+                 ///< normal
 };
 
 inline constexpr EnumName<PosePolicy> kPolicyNames[] = {

@@ -40,7 +40,8 @@ constexpr std::string_view kViaProperties =
 struct Header {
   Provenance provenance;
   double pitch_m = 0;
-  std::uint64_t exposure_count = 0, via_count = 0;
+  std::uint64_t exposure_count = 0;
+  std::uint64_t via_count = 0;
 };
 
 /// The header's part that the hash covers: all after the hash's own line.
@@ -141,7 +142,7 @@ class PartFile {
   void rename_to(const std::filesystem::path& file) {
     std::error_code error;
     std::filesystem::rename(path_, file, error);
-    if (error) refuse(file, "can't be written: " + error.message());
+    if (error) refuse(file, "cannot be written: " + error.message());
     is_renamed_ = true;
   }
 
@@ -213,7 +214,7 @@ Header read_header(std::istream& in, const std::filesystem::path& file, Sha256& 
 void check_size(const Header& header, std::istream& in, const std::filesystem::path& file) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (error) refuse(file, "can't be read: " + error.message());
+  if (error) refuse(file, "cannot be read: " + error.message());
   const auto body = static_cast<std::uintmax_t>(size - static_cast<std::uintmax_t>(in.tellg()));
   constexpr std::uint64_t kCountMax = std::numeric_limits<std::uint32_t>::max();
   if (header.exposure_count > kCountMax || header.via_count > kCountMax ||
@@ -239,7 +240,7 @@ void write_program(const ExposureProgram& program, const std::filesystem::path& 
     if (!is_one_line(*text)) refuse(file, "is not written: its provenance is no short line of text");
   PartFile part(file);
   std::ofstream out(part.path(), std::ios::binary | std::ios::trunc);
-  if (!out) refuse(file, "can't be written");
+  if (!out) refuse(file, "cannot be written");
 
   Sha256 hash;
   const std::string header =
@@ -251,7 +252,7 @@ void write_program(const ExposureProgram& program, const std::filesystem::path& 
   out.seekp(static_cast<std::streamoff>(kMagic.size() + kHashKey.size()));
   out << hash.hex_digest();
   out.close();
-  if (!out) refuse(file, "can't be written whole: is the disk full?");
+  if (!out) refuse(file, "cannot be written completely: is the disk full?");
   part.rename_to(file);
 }
 
@@ -259,7 +260,7 @@ ExposureProgram read_program(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) refuse(file, "is no file");
   std::ifstream in(file, std::ios::binary);
-  if (!in) refuse(file, "can't be read");
+  if (!in) refuse(file, "cannot be read");
   Sha256 hash;
   std::string expected_hash;
   const Header header = read_header(in, file, hash, expected_hash);
@@ -270,7 +271,7 @@ ExposureProgram read_program(const std::filesystem::path& file) {
   program.pitch_m = header.pitch_m;
   program.exposures = read_records<Exposure>(in, hash, header.exposure_count, kExposureBytes);
   program.vias = read_records<Via>(in, hash, header.via_count, kViaBytes);
-  if (!in) refuse(file, "can't be read to its end");
+  if (!in) refuse(file, "cannot be read to its end");
   if (hash.hex_digest() != expected_hash) refuse(file, "is damaged: its SHA-256 is not the one in its header");
   check_vias(program, file);
   return program;

@@ -6,7 +6,7 @@
 namespace hilbrush {
 
 double trapezoid_s(double distance, double speed_max, double acceleration_max) {
-  const double ramps_m = speed_max * speed_max / acceleration_max;  // what speeding up and braking take together
+  const double ramps_m = speed_max * speed_max / acceleration_max;  // the length of both ramps together
   if (distance <= ramps_m) return 2 * std::sqrt(distance / acceleration_max);
   return distance / speed_max + speed_max / acceleration_max;
 }
@@ -19,7 +19,7 @@ double move_s(const CellDescription& cell, const Joints& from, const Joints& to)
                                                                    cell.axes[i].acceleration_max));
   const double tick_s = cell.timing.tick_s;
   if (tick_s <= 0) return slowest_s;
-  // A move that ends on a tick by the numbers must not cost another one by their rounding.
+  // A move that ends exactly on a tick must not cost another one by rounding.
   return std::ceil(slowest_s / tick_s - 1e-9) * tick_s;
 }
 

@@ -86,12 +86,13 @@ Eigen::Isometry3d CheckCell::X_OF(const Joints& joints) const {
   return X_WO(joints).inverse() * X_WF(joints);
 }
 
-/// How far before the focus the first surface is that a ray from the lens, `aside_O` of the beam, meets; nothing if it
+/// How far before the focus a ray from the lens, `aside_O` beside the beam, meets the first surface; nothing if it
 /// meets none.
 std::optional<double> CheckCell::lands_short_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
                                                const Eigen::Vector3d& aside_O, double beyond_m) const {
   const double length_m = cell_.lens.far_m;
-  const Eigen::Vector3f from = (focus_O + aside_O - length_m * beam_O).cast<float>(), along = beam_O.cast<float>();
+  const Eigen::Vector3f from = (focus_O + aside_O - length_m * beam_O).cast<float>();
+  const Eigen::Vector3f along = beam_O.cast<float>();
   RTCRayHit ray{};
   ray.ray.org_x = from.x();
   ray.ray.org_y = from.y();
@@ -110,13 +111,15 @@ std::optional<double> CheckCell::lands_short_m(const Eigen::Vector3d& focus_O, c
 }
 
 std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const {
-  const Eigen::Vector3d focus = focus_O(X_OF), beam = beam_O(X_OF);
+  const Eigen::Vector3d focus = focus_O(X_OF);
+  const Eigen::Vector3d beam = beam_O(X_OF);
   const double length_m = cell_.lens.far_m;
   const auto lands = [&](const std::optional<double>& short_m) { return short_m && std::abs(*short_m) <= tolerance_m; };
   const auto short_m = lands_short_m(focus, beam, Eigen::Vector3d::Zero(), 1.5 * tolerance_m);
   if (!lands(short_m)) {
     // A dot on an edge is met or missed by rounding: then one of the rays close by decides.
-    const Eigen::Vector3d u = .3 * tolerance_m * beam.unitOrthogonal(), v = beam.cross(u);
+    const Eigen::Vector3d u = .3 * tolerance_m * beam.unitOrthogonal();
+    const Eigen::Vector3d v = beam.cross(u);
     bool is_met = false;
     for (const Eigen::Vector3d& aside : {u, v, Eigen::Vector3d(-u), Eigen::Vector3d(-v)})
       is_met = is_met || lands(lands_short_m(focus, beam, aside, 1.5 * tolerance_m));
@@ -129,7 +132,8 @@ std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double toleranc
 }
 
 bool CheckCell::is_in_table(const Eigen::Vector3d& p_O) const {
-  const double r = p_O.head<2>().norm(), post = cell_.fixture.post_height_m;
+  const double r = p_O.head<2>().norm();
+  const double post = cell_.fixture.post_height_m;
   if (p_O.z() >= 0 || p_O.z() < -post - cell_.table.plate_thickness_m) return false;
   return r < (p_O.z() > -post ? cell_.fixture.post_radius_m : cell_.table.plate_radius_m);
 }
@@ -139,7 +143,8 @@ bool CheckCell::is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O,
   alignas(64) RTCRay16 rays{};
   alignas(64) int valid[kBundleRays];
   for (std::size_t i = 0; i < kBundleRays; ++i) {
-    const Eigen::Vector3f from = from_O[i].cast<float>(), along = along_O[i].cast<float>();
+    const Eigen::Vector3f from = from_O[i].cast<float>();
+    const Eigen::Vector3f along = along_O[i].cast<float>();
     rays.org_x[i] = from.x();
     rays.org_y[i] = from.y();
     rays.org_z[i] = from.z();
@@ -157,10 +162,11 @@ bool CheckCell::is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O,
   return std::any_of(std::begin(rays.tfar), std::end(rays.tfar), [](float t) { return t < 0; });
 }
 
-/// A packet of rays along the body, those of its mantle and its axis; and vertices of the object inside it, for bodies
-/// so fat that all rays pass the object by.
+/// A packet of rays along the mantle of the body and its axis; and vertices of the object inside it, for bodies that
+/// are wide enough for all rays to miss the object.
 bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const {
-  const Eigen::Vector3d u = body.axis_F.unitOrthogonal(), v = body.axis_F.cross(u);
+  const Eigen::Vector3d u = body.axis_F.unitOrthogonal();
+  const Eigen::Vector3d v = body.axis_F.cross(u);
   std::array<Eigen::Vector3d, kBundleRays> from_O, along_O;
   along_O.fill(X_OB.linear() * body.axis_F);
   for (std::size_t i = 0; i < kBundleRays; ++i) {
@@ -181,8 +187,10 @@ bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_
 
 /// The body's mantle against plate and post, and the plate's rim and the post's axis against the body.
 bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OF) const {
-  const Eigen::Vector3d from_O = X_OF * body.from_F, axis_O = X_OF.linear() * body.axis_F;
-  const double post = cell_.fixture.post_height_m, thickness = cell_.table.plate_thickness_m;
+  const Eigen::Vector3d from_O = X_OF * body.from_F;
+  const Eigen::Vector3d axis_O = X_OF.linear() * body.axis_F;
+  const double post = cell_.fixture.post_height_m;
+  const double thickness = cell_.table.plate_thickness_m;
   const auto is_in_body = [&](const Eigen::Vector3d& p_O) {
     const double along = axis_O.dot(p_O - from_O);
     if (along < 0 || along > body.length_m) return false;
@@ -190,13 +198,15 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
   };
   constexpr int kRimPoints = 36, kMantleLines = 12, kAxisPoints = 20;
   for (int i = 0; i < kRimPoints; ++i) {
-    const double angle = kTurn * i / kRimPoints, r = cell_.table.plate_radius_m;
+    const double angle = kTurn * i / kRimPoints;
+    const double r = cell_.table.plate_radius_m;
     const Eigen::Vector3d rim(r * std::cos(angle), r * std::sin(angle), -post);
     if (is_in_body(rim) || is_in_body(rim - thickness * Eigen::Vector3d::UnitZ())) return true;
   }
   for (int i = 0; i <= kAxisPoints; ++i)
     if (is_in_body({0, 0, -post * i / kAxisPoints})) return true;
-  const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
+  const Eigen::Vector3d u = axis_O.unitOrthogonal();
+  const Eigen::Vector3d v = axis_O.cross(u);
   for (int i = 0; i < kMantleLines; ++i) {
     const double angle = kTurn * i / kMantleLines;
     const Eigen::Vector3d rim_O = from_O + body.radius_m * (std::cos(angle) * u + std::sin(angle) * v);
@@ -207,7 +217,7 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
 }
 
 std::string CheckCell::body_fault(const Cylinder& body, const char* name, const Eigen::Isometry3d& X_OB) const {
-  // Nothing can touch if the ball around the body is clear of the ball around everything else.
+  // Nothing touches if the ball around the body is clear of the ball around everything else.
   const double ball_m = std::hypot(.5 * body.length_m, body.radius_m);
   const Eigen::Vector3d middle_O = X_OB * (body.from_F + .5 * body.length_m * body.axis_F);
   if (middle_O.norm() > reach_m_ + ball_m) return {};
@@ -221,8 +231,8 @@ std::string CheckCell::body_fault(const Eigen::Isometry3d& X_OF) const {
   return fault.empty() ? body_fault(quill_, "the quill", X_OF) : fault;
 }
 
-/// The link lies along x of its frame, whose origin is at its first joint. Its rounded ends are looked at by rays from
-/// their middles.
+/// The link lies along x of its frame, whose origin is at its first joint. Its rounded ends are checked by rays from
+/// their centers.
 std::string CheckCell::link_fault(const CellDescription::Arm::Link& link, double length_m, const char* name,
                                   const Eigen::Isometry3d& X_WB, const Eigen::Isometry3d& X_WF,
                                   const Eigen::Isometry3d& X_OW) const {
@@ -236,7 +246,8 @@ std::string CheckCell::link_fault(const CellDescription::Arm::Link& link, double
     std::array<Eigen::Vector3d, kBundleRays> from_O, along_O;
     from_O.fill(middle_O);
     for (std::size_t i = 0; i < kBundleRays; ++i) {  // evenly over the ball, by the golden angle
-      const double z = 1 - (2 * static_cast<double>(i) + 1) / kBundleRays, turn = 2.399963 * static_cast<double>(i);
+      const double z = 1 - (2 * static_cast<double>(i) + 1) / kBundleRays;
+      const double turn = 2.399963 * static_cast<double>(i);
       const double r = std::sqrt(1 - z * z);
       along_O[i] = {r * std::cos(turn), r * std::sin(turn), z};
     }
@@ -283,7 +294,8 @@ std::string CheckCell::column_fault(const Eigen::Isometry3d& X_WF, const Eigen::
 
 std::string CheckCell::body_fault(const Joints& joints) const {
   using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
-  const Eigen::Isometry3d X_WF_now = X_WF(joints), X_OW = X_WO(joints).inverse();
+  const Eigen::Isometry3d X_WF_now = X_WF(joints);
+  const Eigen::Isometry3d X_OW = X_WO(joints).inverse();
   if (std::string fault = body_fault(X_OW * X_WF_now); !fault.empty()) return fault;
   const auto& arm = cell_.arm;
   const Eigen::Isometry3d upper =
@@ -298,7 +310,8 @@ std::string CheckCell::body_fault(const Joints& joints) const {
 }
 
 double CheckCell::travel_m(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const {
-  const Eigen::Vector3d far_F = lens_.from_F, near_F = lens_.from_F + lens_.length_m * lens_.axis_F;
+  const Eigen::Vector3d far_F = lens_.from_F;
+  const Eigen::Vector3d near_F = lens_.from_F + lens_.length_m * lens_.axis_F;
   return std::max((a * far_F - b * far_F).norm(), (a * near_F - b * near_F).norm());
 }
 

@@ -28,7 +28,7 @@ class CheckCell {
 
   /// Why the beam, cast from the lens, does not land within `tolerance_m` of the focus; empty if it does.
   std::string beam_fault(const Eigen::Isometry3d& X_OF, double tolerance_m) const;
-  /// What lens body or quill run into; empty if nothing.
+  /// What the lens body or the quill touches; empty if nothing.
   std::string body_fault(const Eigen::Isometry3d& X_OF) const;
   /// ... or upper arm, forearm or the robot's column.
   std::string body_fault(const Joints& joints) const;

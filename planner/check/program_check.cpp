@@ -165,7 +165,9 @@ void ProgramCheck::check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Fault
 
 void ProgramCheck::check_dose(std::size_t i, Faults& faults) const {
   const Exposure& exposure = program_.exposures[i];
-  const double power = exposure.power_w, pulse = exposure.pulse_s, energy = exposure.energy_j;
+  const double power = exposure.power_w;
+  const double pulse = exposure.pulse_s;
+  const double energy = exposure.energy_j;
   const auto& laser = cell_.laser;
   const auto within = [](double value, double low, double high) {
     return value >= low * (1 - kEnergyTolerance) && value <= high * (1 + kEnergyTolerance);
@@ -179,7 +181,7 @@ void ProgramCheck::check_dose(std::size_t i, Faults& faults) const {
   if (exposure.dot_index >= dots_.dots.size()) return;
   const double wanted = dots_.dots[exposure.dot_index].level * full_energy_j(cell_, dots_.pitch_m);
   if (!within(energy, wanted, wanted))
-    faults.push_back({fmt::format("{:.6g} J is not the {:.6g} J that the dot's level asks for", energy, wanted), i});
+    faults.push_back({fmt::format("{:.6g} J is not the {:.6g} J that the dot's level needs", energy, wanted), i});
 }
 
 void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
@@ -207,13 +209,15 @@ void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::s
 
 void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
   if (from == to) return;
-  double end_s = 0, sweep_m = 0;
+  double end_s = 0;
+  double sweep_m = 0;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const double distance = std::abs(to[axis] - from[axis]);
     end_s = std::max(end_s, axis_end_s(distance, cell_.axes[axis]));
     sweep_m += distance * (axis == kJ3 ? 1 : .25);
   }
-  const Eigen::Isometry3d X_from = check_cell_.X_OF(from), X_to = check_cell_.X_OF(to);
+  const Eigen::Isometry3d X_from = check_cell_.X_OF(from);
+  const Eigen::Isometry3d X_to = check_cell_.X_OF(to);
   const double travel_m = check_cell_.travel_m(X_from, X_to);
   if (travel_m < kCheckStepM && sweep_m < 4 * kCheckStepM) return;  // both ends are checked as poses
   const int step_count = static_cast<int>(std::ceil(std::max(travel_m, sweep_m) / kCheckStepM));
@@ -225,7 +229,7 @@ void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i
                                              to[axis] - from[axis]);
     const std::string fault = check_cell_.body_fault(now);
     if (fault.empty()) continue;
-    faults.push_back({"on the way there " + fault, i});
+    faults.push_back({"on the path there, " + fault, i});
     return;
   }
 }
@@ -238,7 +242,8 @@ void ProgramCheck::check_path(std::size_t i, Faults& faults) const {
   for (const Via& via : program_.vias_before(i)) path.push_back(via.joints);
   if (i < program_.exposures.size()) path.push_back(program_.exposures[i].joints);
   for (std::size_t leg = 1; leg < path.size(); ++leg) {
-    const bool leaves_dot = leg == 1 && i > 0, meets_dot = leg + 1 == path.size() && i < program_.exposures.size();
+    const bool leaves_dot = leg == 1 && i > 0;
+    const bool meets_dot = leg + 1 == path.size() && i < program_.exposures.size();
     if (leaves_dot || meets_dot) check_leg_at_dot(path[leg - 1], path[leg], i, faults);
     check_leg(path[leg - 1], path[leg], i, faults);
   }
@@ -261,12 +266,14 @@ std::vector<ProgramFault> check_program(const ExposureProgram& program, const st
   }
 
   // Blocks have their own lists, joined in order: the same faults for any number of threads.
-  const std::size_t count = program.exposures.size() + 1, block_count = (count + kCheckBlock - 1) / kCheckBlock;
+  const std::size_t count = program.exposures.size() + 1;
+  const std::size_t block_count = (count + kCheckBlock - 1) / kCheckBlock;
   constexpr std::size_t kBlocksAtOnce = 16;
   for (std::size_t first = 0; first < block_count && faults.size() < limit; first += kBlocksAtOnce) {
     std::vector<Faults> found(std::min(kBlocksAtOnce, block_count - first));
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t b) {
-      const std::size_t begin = (first + b) * kCheckBlock, end = std::min(count, begin + kCheckBlock);
+      const std::size_t begin = (first + b) * kCheckBlock;
+      const std::size_t end = std::min(count, begin + kCheckBlock);
       for (std::size_t i = begin; i < end && found[b].size() < limit; ++i) {
         if (i < program.exposures.size()) check.check_exposure(i, found[b]);
         check.check_path(i, found[b]);

@@ -30,7 +30,8 @@ class NormalFollower {
 
   std::optional<Joints> next(const Target& target) {
     const Eigen::Vector3d& axis_O = target.smooth_normal_O;
-    const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
+    const Eigen::Vector3d u = axis_O.unitOrthogonal();
+    const Eigen::Vector3d v = axis_O.cross(u);
     for (const Eigen::Vector3d& direction : cone_) {
       const Eigen::Vector3d beam_O = -(direction.x() * u + direction.y() * v + direction.z() * axis_O);
       if (-beam_O.dot(target.face_normal_O) < reach_.cos_max_incidence()) continue;
@@ -53,7 +54,8 @@ class NormalFollower {
     const double along = kinematics.cos_depression() * std::cos(kinematics.yaw(now_));
     const double reach = std::hypot(kinematics.sin_depression(), along);
     if (std::abs(beam_O.z()) < reach) {
-      const double middle = std::atan2(along, kinematics.sin_depression()), half = std::acos(-beam_O.z() / reach);
+      const double middle = std::atan2(along, kinematics.sin_depression());
+      const double half = std::acos(-beam_O.z() / reach);
       for (const double tilt : {middle - half, middle + half})
         tilts.push_back(
             std::clamp(std::remainder(tilt, kTurn), kinematics.axis_min(kTilt), kinematics.axis_max(kTilt)));

@@ -44,7 +44,8 @@ class Neighbors {
  public:
   Neighbors(std::span<const PathDot> path, const PathCost& cost) : path_(path) {
     const std::size_t n = path.size();
-    Eigen::Array3f low = path[0].position_O.array(), high = low;
+    Eigen::Array3f low = path[0].position_O.array();
+    Eigen::Array3f high = low;
     std::vector<float> steps;
     for (std::size_t i = 0; i < n; ++i) {
       low = low.min(path[i].position_O.array());
@@ -61,7 +62,8 @@ class Neighbors {
     std::vector<std::int64_t> keys(n);
     for (std::size_t i = 0; i < n; ++i) keys[i] = key(cell_of(i));
     std::sort(order_.begin(), order_.end(), [&](std::int32_t a, std::int32_t b) {
-      const auto ka = keys[static_cast<std::size_t>(a)], kb = keys[static_cast<std::size_t>(b)];
+      const auto ka = keys[static_cast<std::size_t>(a)];
+      const auto kb = keys[static_cast<std::size_t>(b)];
       return ka != kb ? ka < kb : a < b;
     });
     keys_.resize(n);
@@ -100,7 +102,8 @@ class Neighbors {
   /// From the dot's grid cell and those around it.
   void collect(std::size_t i, std::vector<std::pair<float, std::int32_t>>& found) const {
     const Cell cell = cell_of(i);
-    const std::int64_t x_low = std::max<std::int64_t>(0, cell[0] - 1), x_high = std::min(count_[0] - 1, cell[0] + 1);
+    const std::int64_t x_low = std::max<std::int64_t>(0, cell[0] - 1);
+    const std::int64_t x_high = std::min(count_[0] - 1, cell[0] + 1);
     for (std::int64_t z = cell[2] - 1; z <= cell[2] + 1; ++z)
       for (std::int64_t y = cell[1] - 1; y <= cell[1] + 1; ++y) {
         if (z < 0 || y < 0 || z >= count_[2] || y >= count_[1]) continue;
@@ -159,7 +162,8 @@ class LocalSearch {
     for (std::size_t k = 0; k < kicks; ++k) {
       log_.clear();
       gained_s_ = 0;
-      const std::int64_t longest = std::min(kMax, count / 3), first = below(count - 2);
+      const std::int64_t longest = std::min(kMax, count / 3);
+      const std::int64_t first = below(count - 2);
       const std::int64_t middle = std::min(first + 1 + below(longest), count - 1);
       const std::int64_t end = std::min(middle + 1 + below(longest), count);
       swap_stretches(first, middle, end);
@@ -240,8 +244,10 @@ class LocalSearch {
   }
 
   bool move_segment(std::int32_t a, std::int32_t e, std::int64_t side, std::int64_t length) {
-    const std::int32_t before = at(place(a) - side), after = at(place(e) + side);
-    const float old_s = edge_s(before, a) + edge_s(e, after), removed_s = old_s - cost_(before, after, old_s);
+    const std::int32_t before = at(place(a) - side);
+    const std::int32_t after = at(place(e) + side);
+    const float old_s = edge_s(before, a) + edge_s(e, after);
+    const float removed_s = old_s - cost_(before, after, old_s);
     if (removed_s <= kMinGainS) return false;
     for (const auto& [c, joint_s] : neighbors_.of(a)) {
       if (joint_s >= removed_s) continue;
@@ -250,7 +256,8 @@ class LocalSearch {
       for (const std::int64_t beyond : {1, -1}) {
         const std::int32_t d = at(place(c) + beyond);
         if (d == a || d == e) continue;  // the edge that is taken away
-        const float saved_s = removed_s + edge_s(c, d) - joint_s, gain_s = saved_s - cost_(e, d, saved_s);
+        const float saved_s = removed_s + edge_s(c, d) - joint_s;
+        const float gain_s = saved_s - cost_(e, d, saved_s);
         if (gain_s <= kMinGainS) continue;
         insert(a, e, c, beyond);
         gained_s_ += gain_s;
@@ -271,7 +278,9 @@ class LocalSearch {
 
   /// The segment from `a` to `e` goes between `c` and the dot `beyond` it, `a` next to `c`.
   void insert(std::int32_t a, std::int32_t e, std::int32_t c, std::int64_t beyond) {
-    const std::int64_t first = std::min(place(a), place(e)), last = std::max(place(a), place(e)), to = place(c);
+    const std::int64_t first = std::min(place(a), place(e));
+    const std::int64_t last = std::max(place(a), place(e));
+    const std::int64_t to = place(c);
     // Reading along the path, a segment put behind c begins with a; one put before c ends with it.
     const bool keeps_direction = (place(a) <= place(e)) == (beyond > 0);
     // One reversal swaps the segment with what it passes; each is then reversed again if needed.
@@ -291,8 +300,12 @@ class LocalSearch {
 
   /// The places [first, middle) and [middle, end).
   void swap_stretches(std::int64_t first, std::int64_t middle, std::int64_t end) {
-    const std::int32_t a = at(first - 1), b = at(first), c = at(middle - 1), d = at(middle), e = at(end - 1),
-                       f = at(end);
+    const std::int32_t a = at(first - 1);
+    const std::int32_t b = at(first);
+    const std::int32_t c = at(middle - 1);
+    const std::int32_t d = at(middle);
+    const std::int32_t e = at(end - 1);
+    const std::int32_t f = at(end);
     gained_s_ += cost_(a, b) + cost_(c, d) + cost_(e, f) - cost_(a, d) - cost_(e, b) - cost_(c, f);
     reverse(first, end - 1);
     reverse(first, first + (end - middle) - 1);
@@ -319,7 +332,8 @@ std::vector<std::uint32_t> improved_order(const CellDescription& cell, std::span
   order.reserve(path.size());
   const std::size_t block_count = (path.size() + kTourBlock - 1) / kTourBlock;
   for (std::size_t b = 0; b < block_count; ++b) {
-    const std::size_t begin = b * path.size() / block_count, end = (b + 1) * path.size() / block_count;
+    const std::size_t begin = b * path.size() / block_count;
+    const std::size_t end = (b + 1) * path.size() / block_count;
     if (end - begin < 3) {
       for (std::size_t i = begin; i < end; ++i) order.push_back(static_cast<std::uint32_t>(i));
       continue;

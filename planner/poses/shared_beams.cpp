@@ -166,7 +166,8 @@ class BeamAssignment {
   std::uint32_t find_cheapest() {
     std::vector<std::uint32_t> latest(beams_O_.size(), UINT32_MAX);  // candidate of the dot before, by direction
     std::uint32_t best_before = UINT32_MAX;
-    std::size_t before_begin = 0, before_end = 0;
+    std::size_t before_begin = 0;
+    std::size_t before_end = 0;
     for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
       if (first_[i] == first_[i + 1]) continue;
       std::uint32_t best = UINT32_MAX;

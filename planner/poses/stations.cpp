@@ -206,7 +206,8 @@ class StationChoice {
       const double added = distance_s(at(j), tour) + distance_s(tour, at(j + 1)) - distance_s(at(j), at(j + 1));
       if (removed - added <= min_gain_s) continue;
       const auto first = order_.begin();
-      const auto from = static_cast<std::ptrdiff_t>(i - 1), to = static_cast<std::ptrdiff_t>(j);
+      const auto from = static_cast<std::ptrdiff_t>(i - 1);
+      const auto to = static_cast<std::ptrdiff_t>(j);
       if (from < to)
         std::rotate(first + from, first + from + 1, first + to);
       else

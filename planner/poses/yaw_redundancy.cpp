@@ -41,7 +41,8 @@ class YawPath {
 
   /// First roughly, as far as the tool may turn; then in small steps around that.
   void improve() {
-    const double coarse = one_tick_turn(), fine = coarse / kFinePerCoarse;
+    const double coarse = one_tick_turn();
+    const double fine = coarse / kFinePerCoarse;
     const YawGrid coarse_grid{coarse, std::min(kMaxToOneSide, static_cast<int>(kMaxTurn / coarse)), 4};
     const YawGrid fine_grid{fine, 12, 8};
     for (std::size_t i = 0; i < tour_.size(); ++i) clear_.push_back({clear_turn(i, -1), clear_turn(i, 1)});
@@ -122,7 +123,8 @@ class YawPath {
 
   void fill(const YawGrid& grid, std::size_t i, Row& row) const {
     const Target target = dots_.target(tour_[i]);
-    const Eigen::Vector3d smooth_W = table_.R_WO * target.smooth_normal_O, face_W = table_.R_WO * target.face_normal_O;
+    const Eigen::Vector3d smooth_W = table_.R_WO * target.smooth_normal_O;
+    const Eigen::Vector3d face_W = table_.R_WO * target.face_normal_O;
     const double nominal = -reach_.kinematics().beam_W(station_.yaw).dot(smooth_W);
     const double cos_least = std::min(nominal, std::cos(kept_incidence(reach_.options()))) - 1e-9;
     row.middle = steps_away_[i];
@@ -130,7 +132,8 @@ class YawPath {
     row.arm.assign(row.cost_s.size(), arm_of(joints_[i]));
     for (int y = 0; y < grid.count(); ++y) {
       const int steps = row.middle + y - grid.half;
-      const double turn = steps * grid.step, yaw = station_.yaw + turn;
+      const double turn = steps * grid.step;
+      const double yaw = station_.yaw + turn;
       if (turn < -static_cast<double>(clear_[i][0]) || turn > static_cast<double>(clear_[i][1])) continue;
       const Eigen::Vector3d beam_W = reach_.kinematics().beam_W(yaw);
       const double cosine = -beam_W.dot(smooth_W);

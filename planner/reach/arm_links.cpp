@@ -8,10 +8,17 @@ namespace {
 
 /// After Ericson, Real-Time Collision Detection, 5.1.9.
 double segment_distance_m(const Capsule& a, const Capsule& b) {
-  const Eigen::Vector3d d1 = a.to - a.from, d2 = b.to - b.from, r = a.from - b.from;
-  const double aa = d1.squaredNorm(), bb = d2.squaredNorm(), f = d2.dot(r), c = d1.dot(r), ab = d1.dot(d2);
+  const Eigen::Vector3d d1 = a.to - a.from;
+  const Eigen::Vector3d d2 = b.to - b.from;
+  const Eigen::Vector3d r = a.from - b.from;
+  const double aa = d1.squaredNorm();
+  const double bb = d2.squaredNorm();
+  const double f = d2.dot(r);
+  const double c = d1.dot(r);
+  const double ab = d1.dot(d2);
   constexpr double kPointM2 = 1e-18;
-  double s = 0, t = 0;
+  double s = 0;
+  double t = 0;
   if (aa > kPointM2 && bb > kPointM2) {
     const double parallel = aa * bb - ab * ab;
     s = parallel > 1e-12 * aa * bb ? std::clamp((ab * f - c * bb) / parallel, 0., 1.) : 0;
@@ -53,7 +60,8 @@ std::array<Capsule, 2> arm_links_W(const CellDescription::Arm& arm, const Joints
 Capsule lens_capsule_W(const CellDescription& cell, const Joints& joints) {
   const auto& arm = cell.arm;
   const double yaw = joints[kJ1] + joints[kJ2] + joints[kJ4];
-  const double ce = std::cos(arm.beam_depression), se = std::sin(arm.beam_depression);
+  const double ce = std::cos(arm.beam_depression);
+  const double se = std::sin(arm.beam_depression);
   const Eigen::Vector3d flange = flange_W(arm, joints);
   const Eigen::Vector3d beam_W(ce * std::cos(yaw), ce * std::sin(yaw), -se);
   const auto behind_focus = [&](double length_m) -> Eigen::Vector3d {
@@ -72,7 +80,7 @@ Capsule column_capsule_W(const CellDescription::Arm& arm) {
 }
 
 double column_gap_m(const CellDescription::Arm& arm, const Capsule& body) {
-  // What lies above the top keeps at least that height from it, whatever the capsule's rounded end bulges there.
+  // A body above the top is at least that height away from it, whatever the rounded end of the column's capsule.
   const double above_m = std::min(body.from.z(), body.to.z()) - body.radius_m - arm.column.height_m;
   return std::max(above_m, capsule_gap_m(column_capsule_W(arm), body));
 }

@@ -5,13 +5,13 @@
 #include "planner/cell_model/cell_description.h"
 #include "planner/reach/kinematics.h"
 
-/// Where the arm is: two links, capsules at fixed heights, over which J1 and J2 turn and through which the quill
-/// slides; lens and quill; and the column that all of it stands on.
+/// The shape of the arm: two links, capsules at fixed heights, turned by J1 and J2, through which the quill slides;
+/// lens and quill; and the column that the arm stands on.
 namespace hilbrush {
 
 struct Capsule {
   Eigen::Vector3d from, to;
-  double radius_m = 0;  ///< 0: there is none
+  double radius_m = 0;  ///< 0: no such body
 
   Capsule in_O(const TablePose& table) const {
     const auto to_O = [&](const Eigen::Vector3d& p_W) -> Eigen::Vector3d {

@@ -10,7 +10,8 @@ BeamDirections::BeamDirections(double spacing) {
   directions_O_.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double z = 1 - (2 * static_cast<double>(i) + 1) / static_cast<double>(count);
-    const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.)), r = std::sqrt(1 - z * z);
+    const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.));
+    const double r = std::sqrt(1 - z * z);
     directions_O_.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
   }
 }

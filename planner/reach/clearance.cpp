@@ -18,7 +18,8 @@ constexpr double kBeamTableGapM = .3e-3;
 
 /// Distance from a point at (r, z) to a solid cylinder around the z axis.
 double cylinder_distance_m(double r, double z, double radius, double z_low, double z_high) {
-  const double dr = r - radius, dz = std::max(z_low - z, z - z_high);
+  const double dr = r - radius;
+  const double dz = std::max(z_low - z, z - z_high);
   if (dr <= 0 || dz <= 0) return std::max(dr, dz);
   return std::sqrt(dr * dr + dz * dz);
 }
@@ -41,7 +42,7 @@ double middle_height_m(const TexturedMesh& mesh, const CellDescription& cell) {
   return .5 * (high - cell.fixture.post_height_m - cell.table.plate_thickness_m);
 }
 
-/// Whether links, somewhere, come near enough to what turns around the tilt axis to be looked at.
+/// Whether any link can come near enough to what turns around the tilt axis to be checked.
 bool links_come_near(const CellDescription& cell, double radius_around_tilt_m, double slack_m) {
   const double top_m = cell.table.tilt_axis_W.z() + radius_around_tilt_m + slack_m;
   const auto is_near = [&](const CellDescription::Arm::Link& link) {
@@ -73,7 +74,7 @@ double tool_radius_m(const CellDescription& cell) {
   return std::max({along_beam_m + cell.lens.radius_m, arm.quill_radius_m, arm.fore_link.radius_m});
 }
 
-/// Beyond the largest body that is looked up.
+/// The range of the distance field: beyond the radius of the largest body that is looked up.
 double field_range_m(const CellDescription& cell, bool has_links, bool has_column) {
   double radius = std::max(cell.lens.radius_m, cell.arm.quill_radius_m);
   if (has_links) radius = std::max({radius, cell.arm.upper_link.radius_m, cell.arm.fore_link.radius_m});
@@ -102,23 +103,26 @@ Shortfall Clearance::Slack::shortfall(Obstruction by_object, Obstruction by_tabl
 }
 
 double Clearance::table_distance_m(const Eigen::Vector3d& p_O) const {
-  const double r = p_O.head<2>().norm(), z = p_O.z(), post = cell_.fixture.post_height_m;
-  if (z >= distance_.range_m()) return z;  // nobody asks how much farther it is
+  const double r = p_O.head<2>().norm();
+  const double z = p_O.z();
+  const double post = cell_.fixture.post_height_m;
+  if (z >= distance_.range_m()) return z;  // larger distances are not needed
   return std::min(cylinder_distance_m(r, z, cell_.fixture.post_radius_m, -post, 0),
                   cylinder_distance_m(r, z, cell_.table.plate_radius_m, -post - cell_.table.plate_thickness_m, -post));
 }
 
 Obstruction Clearance::beam_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
-  // What passes an edge by less than the side rays' distance passes it by rounding alone.
-  const Eigen::Vector3d u = kBeamRadiusM * beam_O.unitOrthogonal(), v = beam_O.cross(u);
+  // A beam that passes an edge by less than the distance of the side rays passes it by rounding alone.
+  const Eigen::Vector3d u = kBeamRadiusM * beam_O.unitOrthogonal();
+  const Eigen::Vector3d v = beam_O.cross(u);
   if (rays_.is_beam_blocked(focus_O, -beam_O, {u, .866 * v - .5 * u, -.866 * v - .5 * u}, kBeamStartM, kSideBeamStartM,
                             cell_.lens.far_m))
     return Obstruction::kBeamObject;
   return table_free_length_m(focus_O, beam_O) < cell_.lens.far_m ? Obstruction::kBeamTable : Obstruction::kNone;
 }
 
-/// From the dot towards the lens in steps of the free distance. A dot that itself is nearer to the post than the gap
-/// only has to get away from it.
+/// From the dot towards the lens in steps of the free distance. If the dot itself is nearer to the post than the gap,
+/// the beam only has to move away from it.
 double Clearance::table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
   const double far_m = cell_.lens.far_m;
   if (std::min(focus_O.z(), focus_O.z() - far_m * beam_O.z()) > kBeamTableGapM) return far_m;  // all of it is above
@@ -173,7 +177,7 @@ bool Clearance::keeps_margin(const BallRow& row) const {
     const Eigen::Vector3d p_O = row.first_O + i * row.step_O;
     const double free_m = std::min(distance_(p_O) - error_m, table_distance_m(p_O)) - kMarginM;
     if (free_m < row.ball_m) return false;
-    // A free ball covers the cylinder as far as its chord reaches: that many slices need no look of their own.
+    // A free ball covers the cylinder as far as its chord reaches: that many slices need no check of their own.
     const double chord_m = std::sqrt(free_m * free_m - row.cylinder_m * row.cylinder_m);
     i += std::max(1, 1 + static_cast<int>(std::floor((chord_m - .5 * row.slice_m) / row.slice_m)));
   }
@@ -202,9 +206,11 @@ Clearance::Slack Clearance::lens_slack_fine(const Eigen::Vector3d& focus_O, cons
   const auto& lens = cell_.lens;
   // 19 balls of .4 radius in two rings cover the end disc and the slice of .4 radius behind it: .2 above and below
   // their centers they still are discs of .346 radius, and 19 discs of .275 radius would do.
-  const double ball_m = .4 * lens.radius_m, depth_m = .2 * lens.radius_m;
+  const double ball_m = .4 * lens.radius_m;
+  const double depth_m = .2 * lens.radius_m;
   const double front_m = lens.near_m + depth_m;
-  const Eigen::Vector3d u = beam_O.unitOrthogonal(), v = beam_O.cross(u);
+  const Eigen::Vector3d u = beam_O.unitOrthogonal();
+  const Eigen::Vector3d v = beam_O.cross(u);
   for (int layer = 0; layer < 2; ++layer) {
     const Eigen::Vector3d center = focus_O - (front_m + layer * 2 * depth_m) * beam_O;
     reduce_clearance(center, ball_m, slack);
@@ -251,7 +257,9 @@ void Clearance::reduce_clearance(const Capsule& capsule_O, Slack& slack) const {
 double Clearance::column_tool_gap_m(const Joints& joints) const {
   const auto& arm = cell_.arm;
   if (arm.column.radius_m <= 0) return kSlackMaxM;
-  const double cos_elbow = std::cos(joints[kJ2]), l1 = arm.upper_arm_m, l2 = arm.forearm_m;
+  const double cos_elbow = std::cos(joints[kJ2]);
+  const double l1 = arm.upper_arm_m;
+  const double l2 = arm.forearm_m;
   // The forearm's nearest point to J1's axis is where it passes it, or one of its ends.
   const bool passes = -l1 * cos_elbow > 0 && -l1 * cos_elbow < l2;
   const double nearest_m = passes ? l1 * std::sqrt(1 - cos_elbow * cos_elbow)

@@ -8,9 +8,9 @@
 #include "planner/reach/object_rays.h"
 
 /// Whether the beam, the lens body, the quill, the arm's links and the robot's column are clear of object, post and
-/// plate, which to them are one rigid body, and of each other. Beams are rays (Embree); bodies are rows of balls looked
-/// up in a distance field, which is as fast and was tested against bundles of rays (tests/planner/clearance_test).
-/// Thread-safe after construction.
+/// plate, which move as one rigid body, and of each other. Beams are rays (Embree); bodies are rows of balls looked up
+/// in a distance field, which is as fast and was tested against bundles of rays
+/// (tests/planner/reach/clearance_test.cpp). Thread-safe after construction.
 namespace hilbrush {
 
 enum class Obstruction : std::uint8_t {
@@ -29,18 +29,18 @@ enum class Obstruction : std::uint8_t {
   kColumnTool
 };
 
-/// What is too near to what, and by how much.
+/// Which parts are too near to each other, and by how much.
 struct Shortfall {
   Obstruction what = Obstruction::kNone;
-  double amount_m = 0;  ///< how much is missing to the margin
+  double amount_m = 0;  ///< missing to the margin
 };
 
 class Clearance {
  public:
   Clearance(const TexturedMesh& mesh, const CellDescription& cell);
 
-  /// What planning keeps between the tool and anything else, where it stands still. Half of it is for small moves, see
-  /// transit.h.
+  /// The distance that planning keeps between the tool and anything else at rest. Half of it is reserved for small
+  /// moves, see transit.h.
   static constexpr double kMarginM = 1e-3;
 
   /// What blocks the beam between the lens and the focus, or nothing.
@@ -54,15 +54,15 @@ class Clearance {
   Obstruction lens_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   Obstruction quill_obstruction(const ToolPose& tool) const;
   /// Upper arm and forearm, against object, table and the lens; the column, against those, the quill and the forearm.
-  /// Nothing is computed in a cell where they can't meet.
+  /// Nothing is computed in a cell where they cannot meet.
   Obstruction links_obstruction(const TablePose& table, const Joints& joints) const;
 
-  /// The same with the amount, for what is told about dots that are skipped.
+  /// The same with the amount, for the reason of dots that are skipped.
   Shortfall lens_shortfall(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   Shortfall quill_shortfall(const ToolPose& tool) const;
   Shortfall links_shortfall(const TablePose& table, const Joints& joints) const;
 
-  /// A lower bound on the distance between lens and quill and everything else; negative: maybe they touch. At most
+  /// A lower bound on the distance between lens and quill and everything else; if negative, they may touch. At most
   /// kSlackMaxM.
   double slack_m(const ToolPose& tool) const;
   /// ... and of the links, too.
@@ -90,9 +90,9 @@ class Clearance {
   BallRow lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O, double half_step_m,
                    double from_m) const;
   BallRow quill_row(const ToolPose& tool) const;
-  /// Whether a whole row keeps so much from the ball around everything: what is farther away needs no look-up.
+  /// Whether a whole row keeps this margin to the ball around everything: then no look-up is needed.
   bool is_far(const BallRow& row, double margin_m) const;
-  /// Whether a whole row keeps the margin; slices inside a free ball are passed over.
+  /// Whether a whole row keeps the margin; slices inside a free ball are skipped.
   bool keeps_margin(const BallRow& row) const;
   void reduce_clearance(const BallRow& row, Slack& slack) const;
   void reduce_clearance(const Eigen::Vector3d& ball_O, double radius_m, Slack& slack) const;
@@ -104,7 +104,7 @@ class Clearance {
   Slack column_slack(const TablePose& table) const;
   double column_tool_gap_m(const Joints& joints) const;
   void reduce_clearance(const Capsule& capsule_O, Slack& slack) const;
-  /// Whether anything at all is left to be looked at by links_obstruction().
+  /// Whether links_obstruction() has anything to check.
   bool arm_may_touch() const { return links_may_touch_ || links_may_touch_lens_ || cell_.arm.column.radius_m > 0; }
   double table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   /// To the plate and the post, in O; exact outside up to the field's range and never more than it is, not above zero

@@ -28,7 +28,10 @@ Kinematics::Kinematics(const CellDescription& cell)
 }
 
 TablePose Kinematics::table_pose(double tilt, double rotation) const {
-  const double ca = std::cos(tilt), sa = std::sin(tilt), cc = std::cos(rotation), sc = std::sin(rotation);
+  const double ca = std::cos(tilt);
+  const double sa = std::sin(tilt);
+  const double cc = std::cos(rotation);
+  const double sc = std::sin(rotation);
   TablePose pose;
   pose.tilt = tilt;
   pose.rotation = rotation;
@@ -66,7 +69,8 @@ bool Kinematics::solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elb
   const auto& arm = cell_.arm;
   const Eigen::Vector3d flange_W = focus_W - arm.flange_to_focus_m * beam_W(yaw);
   const double distance2 = flange_W.head<2>().squaredNorm();
-  const double l1 = arm.upper_arm_m, l2 = arm.forearm_m;
+  const double l1 = arm.upper_arm_m;
+  const double l2 = arm.forearm_m;
   const double cos_j2 = (distance2 - l1 * l1 - l2 * l2) / (2 * l1 * l2);
   if (!(std::abs(cos_j2) < 1)) {
     if (boundary_excess_m) {
@@ -85,7 +89,8 @@ bool Kinematics::solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elb
 }
 
 Joints Kinematics::per_yaw(const Joints& joints) const {
-  const double forearm_angle = joints[kJ1] + joints[kJ2], tool_yaw = yaw(joints);
+  const double forearm_angle = joints[kJ1] + joints[kJ2];
+  const double tool_yaw = yaw(joints);
   // The flange circles around the focus.
   const Eigen::Vector2d flange_W =
       cell_.arm.flange_to_focus_m * cos_e_ * Eigen::Vector2d(std::sin(tool_yaw), -std::cos(tool_yaw));
@@ -113,7 +118,8 @@ LimitExcess Kinematics::limit_excess(const Joints& joints) const {
 }
 
 double Kinematics::unwrap_near(std::size_t axis, double angle, double reference) const {
-  const double low = axis_min(axis), high = axis_max(axis);
+  const double low = axis_min(axis);
+  const double high = axis_max(axis);
   const double nearest = angle + kTurn * std::round((reference - angle) / kTurn);
   if (nearest >= low && nearest <= high) return nearest;
   const double unwrapped = nearest > high ? angle + kTurn * std::floor((high - angle) / kTurn)

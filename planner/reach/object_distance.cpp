@@ -9,10 +9,11 @@
 namespace hilbrush {
 namespace {
 
+/// Grid step, m; larger where the grid would have more nodes than kMaxNodes.
 constexpr double kStepM = 2e-3;
-constexpr double kNodesMax = 1.5e6;
-constexpr double kSurfelsMax = 3e6;
-constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
+constexpr double kMaxNodes = 1.5e6;
+constexpr double kMaxSurfacePoints = 3e6;
+constexpr std::uint32_t kNoPoint = std::numeric_limits<std::uint32_t>::max();
 
 }  // namespace
 
@@ -24,9 +25,9 @@ ObjectDistance::ObjectDistance(const TexturedMesh& mesh, double range_m) : range
 void ObjectDistance::choose_grid(const TexturedMesh& mesh) {
   const auto [low, high] = bounds(mesh);
   const Eigen::Vector3d extent = high - low + Eigen::Vector3d::Constant(2 * range_m_);
-  step_m_ = std::max(kStepM, std::cbrt(extent.prod() / kNodesMax));
+  step_m_ = std::max(kStepM, std::cbrt(extent.prod() / kMaxNodes));
   low_O_ = low - Eigen::Vector3d::Constant(range_m_);
-  spacing_m_ = std::max(step_m_ / 2, std::sqrt(2 * mesh.area_m2() / kSurfelsMax));
+  spacing_m_ = std::max(step_m_ / 2, std::sqrt(2 * mesh.area_m2() / kMaxSurfacePoints));
   size_ = (extent / step_m_).array().ceil().cast<int>() + 1;
 }
 
@@ -35,7 +36,8 @@ std::vector<Eigen::Vector3f> ObjectDistance::surface_points(const TexturedMesh& 
   std::vector<Eigen::Vector3f> points;
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
     const Eigen::Vector3d& a = mesh.corner(t, 0);
-    const Eigen::Vector3d ab = mesh.corner(t, 1) - a, ac = mesh.corner(t, 2) - a;
+    const Eigen::Vector3d ab = mesh.corner(t, 1) - a;
+    const Eigen::Vector3d ac = mesh.corner(t, 2) - a;
     const double longest = std::max({ab.norm(), ac.norm(), (ac - ab).norm()});
     const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
     for (int i = 0; i <= n; ++i)
@@ -45,10 +47,11 @@ std::vector<Eigen::Vector3f> ObjectDistance::surface_points(const TexturedMesh& 
   return points;
 }
 
-/// Each node learns its nearest point from its neighbors: first those around each point, then by scans to and fro.
+/// Each node takes its nearest point from its neighbors: first those around each point, then by scans in both
+/// directions.
 void ObjectDistance::spread(const std::vector<Eigen::Vector3f>& points) {
   const std::size_t node_count = index(0, 0, size_.z());
-  std::vector<std::uint32_t> nearest(node_count, kNobody);
+  std::vector<std::uint32_t> nearest(node_count, kNoPoint);
   std::vector<float> distance2(node_count, std::numeric_limits<float>::max());
   const Eigen::Vector3f low = low_O_.cast<float>();
   const float step = static_cast<float>(step_m_);
@@ -67,25 +70,27 @@ void ObjectDistance::spread(const std::vector<Eigen::Vector3f>& points) {
     for (int c = 0; c < 8; ++c) offer(corner.x() + (c & 1), corner.y() + (c >> 1 & 1), corner.z() + (c >> 2), k);
   }
 
-  // Each slab learns from the one before it, then passes on what it knows within itself: rows there and back, columns
-  // there and back.
-  const auto learn = [&](int x, int y, int z, const std::array<int, 3>& step_to) {
-    const int nx = x + step_to[0], ny = y + step_to[1], nz = z + step_to[2];
+  // Each slab takes points from the one before it, then passes them on within itself: rows and columns, each in both
+  // directions.
+  const auto take_from = [&](int x, int y, int z, const std::array<int, 3>& step_to) {
+    const int nx = x + step_to[0];
+    const int ny = y + step_to[1];
+    const int nz = z + step_to[2];
     if (nx < 0 || ny < 0 || nz < 0 || nx >= size_.x() || ny >= size_.y() || nz >= size_.z()) return;
     const std::uint32_t point = nearest[index(nx, ny, nz)];
-    if (point != kNobody && point != nearest[index(x, y, z)]) offer(x, y, z, point);
+    if (point != kNoPoint && point != nearest[index(x, y, z)]) offer(x, y, z, point);
   };
   const auto scan_row = [&](int y, int z, int dy) {
     for (int x = 0; x < size_.x(); ++x) {
-      for (int dx = -1; dx <= 1; ++dx) learn(x, y, z, {dx, dy, 0});
-      learn(x, y, z, {-1, 0, 0});
+      for (int dx = -1; dx <= 1; ++dx) take_from(x, y, z, {dx, dy, 0});
+      take_from(x, y, z, {-1, 0, 0});
     }
-    for (int x = size_.x() - 1; x >= 0; --x) learn(x, y, z, {1, 0, 0});
+    for (int x = size_.x() - 1; x >= 0; --x) take_from(x, y, z, {1, 0, 0});
   };
   const auto scan_slab = [&](int z, int dz) {
     for (int y = 0; y < size_.y(); ++y)
       for (int x = 0; x < size_.x(); ++x)
-        for (int n = 0; n < 9; ++n) learn(x, y, z, {n % 3 - 1, n / 3 - 1, dz});
+        for (int n = 0; n < 9; ++n) take_from(x, y, z, {n % 3 - 1, n / 3 - 1, dz});
     for (int y = 0; y < size_.y(); ++y) scan_row(y, z, -1);
     for (int y = size_.y() - 1; y >= 0; --y) scan_row(y, z, 1);
   };
@@ -101,7 +106,8 @@ double ObjectDistance::operator()(const Eigen::Vector3d& p_O) const {
   if (!((at >= 0).all() && (at < (size_.array() - 1).cast<double>()).all())) return range_m_;
   const Eigen::Array3i node = at.cast<int>();
   const Eigen::Array3d f = at - node.cast<double>();
-  const std::size_t row = static_cast<std::size_t>(size_.x()), slab = row * static_cast<std::size_t>(size_.y());
+  const std::size_t row = static_cast<std::size_t>(size_.x());
+  const std::size_t slab = row * static_cast<std::size_t>(size_.y());
   const float* d = &distance_m_[index(node.x(), node.y(), node.z())];
   const auto along_x = [&](const float* p) { return p[0] + f.x() * (p[1] - p[0]); };
   const auto along_y = [&](const float* p) {

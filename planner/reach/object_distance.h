@@ -4,7 +4,7 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// Distance to the object's surface on a grid, so that "is this sphere clear?" costs one interpolation.
+/// Distance to the object's surface on a grid, so that a clearance test of a sphere costs one interpolation.
 /// Exact distances at the nodes, to the spacing of the points that stand for the surface: within error_m() of the truth
 /// anywhere farther than a few grid steps from it. Unsigned: inside and outside are alike.
 namespace hilbrush {

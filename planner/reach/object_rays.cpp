@@ -30,7 +30,8 @@ namespace {
 
 void set_ray(RTCRay& ray, const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O, double near_m,
              double far_m) {
-  const Eigen::Vector3f from = from_O.cast<float>(), direction = direction_O.cast<float>();
+  const Eigen::Vector3f from = from_O.cast<float>();
+  const Eigen::Vector3f direction = direction_O.cast<float>();
   ray.org_x = from.x();
   ray.org_y = from.y();
   ray.org_z = from.z();

@@ -10,7 +10,7 @@
 namespace hilbrush {
 namespace {
 
-/// Against rounding of normals to single precision, so that no exposure exceeds the limit by an ulp.
+/// rad: covers the rounding of normals to single precision, so that no exposure exceeds the limit by an ulp.
 constexpr double kIncidenceGuard = 1e-4;
 constexpr double kTiltStep = 7.5 * kDegree, kFineTiltStep = 2.5 * kDegree;
 
@@ -140,7 +140,8 @@ bool Reach::can_hit(const Target& target, const Eigen::Vector3d& beam_O) const {
 std::optional<DotPose> Reach::search_cone(const Target& target, const Eigen::Vector3d& axis_O, const Directions& cone,
                                           const std::vector<double>& tilts, const Joints& reference,
                                           FailureTally* tally) const {
-  const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
+  const Eigen::Vector3d u = axis_O.unitOrthogonal();
+  const Eigen::Vector3d v = axis_O.cross(u);
   for (const Eigen::Vector3d& direction : cone) {
     const Eigen::Vector3d beam_O = -(direction.x() * u + direction.y() * v + direction.z() * axis_O);
     if (-beam_O.dot(target.face_normal_O) < cos_max_incidence_ - 1e-9) continue;
@@ -169,8 +170,8 @@ std::optional<DotPose> Reach::find_pose_quickly(const Target& target, const Join
 
 PoseSearchResult Reach::find_pose(const Target& target, const Joints& reference) const {
   if (auto pose = find_pose_quickly(target, reference)) return {std::move(pose), {}};
-  // The second, finer search finds the reason as well. A third one is for windows that are narrower still; near to one
-  // are those of the failures that little is missing to, whatever the clearance_.
+  // The second, finer search also finds the reason. A third one is for windows that are narrower still, and only where
+  // the best failure is a near miss.
   FailureTally tally;
   auto pose = search_cone(target, target.face_normal_O, fine_cone_, tilts_, reference, &tally);
   if (!pose && tally.is_nearly_reached())

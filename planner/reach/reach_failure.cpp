@@ -112,10 +112,10 @@ void FailureTally::limit(const LimitExcess& excess) {
 }
 
 bool FailureTally::is_nearly_reached() const {
-  // The second look's steps are 5 degrees of direction and 7.5 of tilt: half of that turns the object, within .2 m of
-  // the axis, by less than this.
+  // The steps of the second search are 5 degrees of direction and 7.5 of tilt: half of that turns the object, within .2
+  // m of the axis, by less than this.
   constexpr double kLengthM = .02, kAngle = 12 * kDegree;
-  // A window that is missed is narrow; a beam that is blocked near the dot is nowhere near one.
+  // A window that was missed is narrow; a beam that is blocked near the dot is far from any.
   constexpr double kDeepM = .01;
   switch (stage_) {
     case kNone:

@@ -19,7 +19,7 @@ class FailureTally {
   void links(const Shortfall& shortfall);
 
   SkippedDot describe() const;
-  /// Whether little enough is missing that finer directions and tilts might find it.
+  /// Whether the best failure is a near miss: finer directions and tilts might find a pose.
   bool is_nearly_reached() const;
 
  private:

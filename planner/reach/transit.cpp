@@ -18,7 +18,8 @@ constexpr double kBackOffsM[] = {.005, .01, .02, .03, .045, .06, .08, .1};
 
 /// Distance covered `time_s` into a move over `distance` from rest to rest.
 double covered(double distance, const AxisDescription& axis, double time_s) {
-  const double v = axis.speed_max, a = axis.acceleration_max;
+  const double v = axis.speed_max;
+  const double a = axis.acceleration_max;
   const double whole_s = trapezoid_s(distance, v, a);
   if (time_s >= whole_s) return distance;
   const double ramp_s = std::min(v / a, whole_s / 2);
@@ -59,10 +60,12 @@ double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
   const auto moved = [&](std::size_t axis) { return std::abs(b[axis] - a[axis]); };
   // Along the arm the flange is farthest from J1 at the straighter of the two ends.
   const double c = std::cos(std::min(std::abs(a[kJ2]), std::abs(b[kJ2])));
-  const double l1 = arm.upper_arm_m, l2 = arm.forearm_m;
+  const double l1 = arm.upper_arm_m;
+  const double l2 = arm.forearm_m;
   const double flange_m = a[kJ2] * b[kJ2] > 0 ? std::sqrt(l1 * l1 + l2 * l2 + 2 * l1 * l2 * c) : l1 + l2;
   // Yaws that cancel do not add up, whichever of them comes first.
-  double left = 0, right = 0;
+  double left = 0;
+  double right = 0;
   for (const std::size_t axis : {kJ1, kJ2, kJ4}) (b[axis] > a[axis] ? left : right) += std::abs(b[axis] - a[axis]);
   const double yaw_change = std::max(left, right);
   // With the arm folded the elbow is the farthest point of the links.
@@ -92,7 +95,8 @@ bool Transit::is_clear(const Joints& from, const Joints& to) const {
     end_s = std::max(end_s, trapezoid_s(std::abs(to[i] - from[i]), reach_.cell().axes[i].speed_max,
                                         reach_.cell().axes[i].acceleration_max));
   Joints now = from;
-  double now_s = 0, step_s = end_s / 4;
+  double now_s = 0;
+  double step_s = end_s / 4;
   while (true) {
     if (slack_m < least_m) return false;
     if (travel_bound_m(now, to) <= slack_m) return true;
@@ -120,7 +124,8 @@ std::optional<Joints> Transit::backed_off(const Joints& joints, double distance_
   const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
   const ToolPose tool = kinematics.tool_pose(joints);
   const double yaw = kinematics.yaw(joints);
-  const Eigen::Vector3d focus_W = table.to_W(tool.focus_O), beam_W = kinematics.beam_W(yaw);
+  const Eigen::Vector3d focus_W = table.to_W(tool.focus_O);
+  const Eigen::Vector3d beam_W = kinematics.beam_W(yaw);
   for (double back_m = distance_m; back_m > .003; back_m *= .7) {
     Joints back = joints;
     if (!kinematics.solve_arm(focus_W - back_m * beam_W, yaw, elbow_of(joints), back)) continue;
@@ -140,16 +145,19 @@ std::optional<std::vector<Joints>> Transit::route(const Joints& from, const Join
   if (!needs_retract(from, to) && is_clear(from, to)) return std::vector<Joints>{};
 
   for (const double back_m : kBackOffsM) {
-    const auto out = backed_off(from, back_m), in = backed_off(to, back_m);
+    const auto out = backed_off(from, back_m);
+    const auto in = backed_off(to, back_m);
     if (!out || !in) continue;
     if (are_clear({from, *out, *in, to})) return std::vector<Joints>{*out, *in};
   }
-  const auto out = retreat(from, true), in = retreat(to, false);
+  const auto out = retreat(from, true);
+  const auto in = retreat(to, false);
   if (!out || !in) return std::nullopt;
   std::vector<Joints> path = *out;
   if (!is_clear(out->back(), in->back())) {
     // The arm goes home, the table turns, the arm comes back.
-    Joints before = out->back(), after = in->back();
+    Joints before = out->back();
+    Joints after = in->back();
     for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4}) before[axis] = after[axis] = reach_.cell().axes[axis].home;
     if (!are_clear({out->back(), before, after, in->back()})) return std::nullopt;
     path.push_back(before);
@@ -166,8 +174,7 @@ std::optional<std::vector<Joints>> Transit::retreat(const Joints& pose, bool is_
     if (!is_outwards) std::reverse(path.begin(), path.end());
     return are_clear(path);
   };
-  // In one go; or in steps, because the axes do not arrive together and the shorter a step, the less it strays from the
-  // beam.
+  // In one move; or in steps, because the axes do not arrive together, and shorter steps deviate less from the beam.
   std::vector<Joints> steps;
   for (const double back_m : kBackOffsM) {
     const auto back = backed_off(pose, back_m);

@@ -74,7 +74,7 @@ class Sampler {
   std::mt19937 random_;
 };
 
-/// The nodes of the tree that are the fewest seconds away, nearest first.
+/// The nodes of the tree that take the least time to reach, nearest first.
 std::vector<int> nearest(const CellDescription& cell, const Tree& tree, const Joints& joints, std::size_t count) {
   std::vector<std::pair<double, int>> by_time;
   for (std::size_t i = 0; i < tree.size(); ++i)
@@ -94,7 +94,7 @@ Joints interpolated(const Joints& from, const Joints& to, double share) {
 
 }  // namespace
 
-/// Takes out way-points that are not needed.
+/// Removes way-points that are not needed.
 std::vector<Joints> Transit::shortened(std::vector<Joints> path) const {
   for (std::size_t i = 0; i + 2 < path.size(); ++i)
     for (std::size_t j = path.size() - 1; j > i + 1; --j) {

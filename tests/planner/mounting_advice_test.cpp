@@ -70,7 +70,7 @@ TEST(MountingAdvice, NothingIsSaidWhereNothingHelps) {
   const TexturedMesh mesh = drilled_block();
   const DotSequence dots = scatter(mesh, 2e-3);
   const Reached now = reached(mesh, cell, dots);
-  ASSERT_FALSE(now.skipped.empty());  // the walls of the hole, whichever way it is held
+  ASSERT_FALSE(now.skipped.empty());  // the walls of the hole, on either axis
   EXPECT_FALSE(advise_mounting(mesh, cell, {}, {}, dots, now.skipped, 1));
   EXPECT_FALSE(advise_mounting(mesh, cell, {}, {}, dots, {}, 1));
   std::vector<SkippedDot> for_energy = now.skipped;

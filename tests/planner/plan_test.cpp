@@ -89,7 +89,8 @@ TEST(Plan, ACupIsPaintedInsideOutsideAndBelow) {
   const Reach reach(mesh, cell, {});
   const Plan plan = plan_exposures(reach, dots);
   EXPECT_GT(static_cast<double>(plan.program.exposures.size()), .99 * static_cast<double>(dots.dots.size()));
-  std::size_t below = 0, inside = 0;
+  std::size_t below = 0;
+  std::size_t inside = 0;
   for (const Exposure& exposure : plan.program.exposures) {
     if (exposure.position_O.z() < 1e-6) ++below;
     if (exposure.position_O.z() > .03 && exposure.position_O.dot(exposure.normal_O.cast<double>()) < 0) ++inside;
@@ -167,7 +168,8 @@ TEST(Plan, TooMuchEnergyIsSkippedWithAReason) {
 
 TEST(Dose, PowerAndPulseStayWithinTheLaser) {
   const CellDescription cell = default_cell();
-  const double pitch_m = .0254 / 100, full_j = full_energy_j(cell, pitch_m);
+  const double pitch_m = .0254 / 100;
+  const double full_j = full_energy_j(cell, pitch_m);
   const auto& laser = cell.laser;
   for (double energy_j = laser.power_min_w * laser.pulse_min_s * 1.0001;
        energy_j < laser.power_max_w * laser.pulse_max_s; energy_j *= 1.3) {
@@ -193,7 +195,8 @@ TEST(Dose, PowerAndPulseStayWithinTheLaser) {
 /// Where the axes rest if they are stopped `time_s` into a move: each brakes by itself.
 Joints stopped_at(const CellDescription& cell, const Joints& from, const Joints& to, double time_s) {
   constexpr double kStep = 1e-6;
-  const Joints a = joints_during(cell, from, to, time_s), b = joints_during(cell, from, to, time_s + kStep);
+  const Joints a = joints_during(cell, from, to, time_s);
+  const Joints b = joints_during(cell, from, to, time_s + kStep);
   Joints rest = a;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double speed = (b[i] - a[i]) / kStep;
@@ -210,11 +213,12 @@ TEST(Approach, IsClearFromWhereverTheCellWasStopped) {
   std::uniform_real_distribution<double> share(0, 1);
   for (int n = 0; n < 300; ++n) {
     const std::size_t i = 1 + random() % (exposures.size() - 1);
-    std::vector<Joints> way{exposures[i - 1].joints};
-    for (const Via& via : plan.program.vias_before(i)) way.push_back(via.joints);
-    way.push_back(exposures[i].joints);
-    const std::size_t leg = 1 + random() % (way.size() - 1);
-    const Joints from = stopped_at(cell, way[leg - 1], way[leg], share(random) * move_s(cell, way[leg - 1], way[leg]));
+    std::vector<Joints> path{exposures[i - 1].joints};
+    for (const Via& via : plan.program.vias_before(i)) path.push_back(via.joints);
+    path.push_back(exposures[i].joints);
+    const std::size_t leg = 1 + random() % (path.size() - 1);
+    const Joints from =
+        stopped_at(cell, path[leg - 1], path[leg], share(random) * move_s(cell, path[leg - 1], path[leg]));
 
     std::vector<Joints> back{from};
     ASSERT_NO_THROW({
@@ -239,7 +243,7 @@ TEST(Approach, FromHomeAndFromNonsense) {
   outside[kJ1] = std::nan("");
   EXPECT_THROW(plan_approach(reach, plan.program, 0, outside), InputError);
   EXPECT_THROW(plan_approach(reach, plan.program, plan.program.exposures.size(), home_joints(cell)), InputError);
-  // A pose in which the lens is inside the ball: no way out is promised.
+  // A pose in which the lens is inside the ball: a path out of it is not guaranteed.
   const Kinematics kinematics(cell);
   Joints inside = home_joints(cell);
   const TablePose table = kinematics.table_pose(0, 0);

@@ -78,8 +78,12 @@ DotSequence scatter(const TexturedMesh& mesh, double pitch_m, unsigned seed) {
     const double at = sum * (static_cast<double>(i) + uniform(random)) / static_cast<double>(count);
     const auto t = static_cast<std::size_t>(
         std::min(std::lower_bound(area_sum.begin(), area_sum.end(), at), area_sum.end() - 1) - area_sum.begin());
-    double v = uniform(random), w = uniform(random);
-    if (v + w > 1) v = 1 - v, w = 1 - w;
+    double v = uniform(random);
+    double w = uniform(random);
+    if (v + w > 1) {
+      v = 1 - v;
+      w = 1 - w;
+    }
     const Eigen::Vector3d weights(1 - v - w, v, w);
     Dot dot;
     dot.position_O.setZero();

@@ -33,7 +33,8 @@ TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
       slowest = std::max(slowest,
                          trapezoid_s(std::abs(to[i] - home[i]), cell.axes[i].speed_max, cell.axes[i].acceleration_max));
     }
-    const double move = move_s(cell, home, to), ticks = move / cell.timing.tick_s;
+    const double move = move_s(cell, home, to);
+    const double ticks = move / cell.timing.tick_s;
     EXPECT_GE(move, slowest - 1e-9);
     EXPECT_LT(move, slowest + cell.timing.tick_s);
     EXPECT_NEAR(ticks, std::round(ticks), 1e-6);
@@ -45,12 +46,14 @@ TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
 
 TEST(TimeModel, JointsDuringAMoveKeepSpeedAndAcceleration) {
   const CellDescription cell = default_cell();
-  Joints from = home_joints(cell), to = from;
+  Joints from = home_joints(cell);
+  Joints to = from;
   to[kJ1] -= 1, to[kJ3] -= .2, to[kRotation] += 2;
   const double dt = 1e-4;
   for (double t = dt; t < 1; t += dt) {
-    const Joints a = joints_during(cell, from, to, t - dt), b = joints_during(cell, from, to, t),
-                 c = joints_during(cell, from, to, t + dt);
+    const Joints a = joints_during(cell, from, to, t - dt);
+    const Joints b = joints_during(cell, from, to, t);
+    const Joints c = joints_during(cell, from, to, t + dt);
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       EXPECT_LE(std::abs(b[i] - a[i]) / dt, cell.axes[i].speed_max * (1 + 1e-6));
       EXPECT_LE(std::abs(c[i] - 2 * b[i] + a[i]) / (dt * dt), cell.axes[i].acceleration_max * (1 + 1e-3));

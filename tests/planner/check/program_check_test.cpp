@@ -15,7 +15,7 @@
 namespace hilbrush {
 namespace {
 
-/// A good program, to be spoilt in one way after another.
+/// A good program, for faults to be added to it one by one.
 struct Work {
   CellDescription cell = default_cell();
   PlanOptions options;
@@ -39,7 +39,8 @@ struct Work {
   Eigen::Vector3d flange_O(std::size_t i) { return tool(i).focus_O - cell.arm.flange_to_focus_m * tool(i).beam_O; }
   /// A triangle of 4 mm across a direction, of which planning knew nothing.
   void add_screen(const Eigen::Vector3d& across_O, const Eigen::Vector3d& center_O) {
-    const Eigen::Vector3d u = .004 * across_O.unitOrthogonal(), v = across_O.cross(u);
+    const Eigen::Vector3d u = .004 * across_O.unitOrthogonal();
+    const Eigen::Vector3d v = across_O.cross(u);
     const auto n = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.insert(mesh.vertices.end(), {center_O + u, center_O - u + v, center_O - u - v});
     mesh.triangles.push_back({n, n + 1, n + 2});
@@ -117,7 +118,7 @@ const Spoiling kSpoilings[] = {
        for (auto& via : w.plan.program.vias)
          via.before_exposure = std::min(via.before_exposure, w.plan.program.vias.back().before_exposure);
      }},
-    {"DotUnknown", "none of the", [](Work& w) { w.exposure(kVictim).dot_index = 1u << 30; }},
+    {"DotUnknown", "is not one of the", [](Work& w) { w.exposure(kVictim).dot_index = 1u << 30; }},
     {"ExposedAndSkipped", "more than once",
      [](Work& w) {
        w.plan.skipped.push_back({w.exposure(kVictim).dot_index, SkipReason::kOccluded, "a reason"});
@@ -135,10 +136,10 @@ const Spoiling kSpoilings[] = {
     {"JointOutOfLimits", "is outside", [](Work& w) { w.exposure(kVictim).joints[kJ1] = 2.5; }},
     {"JointNotANumber", "is outside", [](Work& w) { w.exposure(kVictim).joints[kTilt] = std::nan(""); }},
     {"FocusOff", "off the dot", [](Work& w) { w.exposure(kVictim).joints[kJ3] += 1e-8; }},
-    {"PlaceChanged", "not that of dot", [](Work& w) { w.exposure(kVictim).position_O.x() += 1e-9; }},
-    {"ToneChanged", "not that of dot", [](Work& w) { w.exposure(kVictim).tone = .5F; }},
+    {"PlaceChanged", "differs from that of dot", [](Work& w) { w.exposure(kVictim).position_O.x() += 1e-9; }},
+    {"ToneChanged", "differs from that of dot", [](Work& w) { w.exposure(kVictim).tone = .5F; }},
     {"TooOblique", "more than 45", [](Work& w) { w.turn_yaw(kVictim, 1.5); }},
-    {"IncidenceMisstated", "is said to be", [](Work& w) { w.exposure(kVictim).incidence += .05F; }},
+    {"IncidenceMisstated", "is stated as", [](Work& w) { w.exposure(kVictim).incidence += .05F; }},
     {"PowerTooHigh", "W is outside", [](Work& w) { w.exposure(kVictim).power_w = 1; }},
     {"PowerNotANumber", "W is outside", [](Work& w) { w.exposure(kVictim).power_w = std::nanf(""); }},
     {"PulseTooLong", "pulse", [](Work& w) { w.exposure(kVictim).pulse_s = .2F; }},
@@ -151,7 +152,7 @@ const Spoiling kSpoilings[] = {
     {"ElbowFlips", "elbow flips", [](Work& w) { w.flip_elbow(w.direct_one()); }},
     {"ElbowFlipsToAWayPoint", "elbow flips",
      [](Work& w) {
-       // A way-point in between is no retract.
+       // A way-point in between is not a retract.
        const std::size_t i = w.direct_one();
        Joints there = w.exposure(i - 1).joints;
        w.flip_elbow(i - 1, there);
@@ -179,11 +180,12 @@ const Spoiling kSpoilings[] = {
        via.joints[kJ3] = std::max(via.joints[kJ3], 0.);
        w.add_via(i, via.joints);
      }},
-    {"ScreenOnTheWay", "on the way there the lens body touches",
+    {"ScreenOnThePath", "on the path there, the lens body touches",
      [](Work& w) {
        // Where the lens is half way from home to the next way-point or dot.
        const auto vias = w.plan.program.vias_before(0);
-       const Joints from = vias[0].joints, to = vias.size() > 1 ? vias[1].joints : w.exposure(0).joints;
+       const Joints from = vias[0].joints;
+       const Joints to = vias.size() > 1 ? vias[1].joints : w.exposure(0).joints;
        const Joints there = joints_during(w.cell, from, to, .5 * move_s(w.cell, from, to));
        const ToolPose tool = Kinematics(w.cell).tool_pose(there);
        w.add_screen(tool.beam_O, tool.focus_O - .5 * (w.cell.lens.near_m + w.cell.lens.far_m) * tool.beam_O);
@@ -196,7 +198,8 @@ const Spoiling kSpoilings[] = {
        });
        w.plan.program.vias = {w.plan.program.vias.front(), w.plan.program.vias.back()};
        // Two dots on opposite sides, one after the other, with the arm on the other side of the object.
-       std::size_t a = 0, b = 0;
+       std::size_t a = 0;
+       std::size_t b = 0;
        for (std::size_t i = 0; i < w.plan.program.exposures.size(); ++i) {
          if (w.exposure(i).position_O.x() > w.exposure(a).position_O.x()) a = i;
          if (w.exposure(i).position_O.x() < w.exposure(b).position_O.x()) b = i;

@@ -22,8 +22,8 @@ std::vector<PathDot> random_plate(std::size_t count, unsigned seed) {
     dot.arm = {4 * dot.position_O.x(), 4 * dot.position_O.y(), .1F, -4 * (dot.position_O.x() + dot.position_O.y())};
   }
   std::sort(path.begin(), path.end(), [](const PathDot& a, const PathDot& b) {  // strips, back and forth
-    const int strip_a = static_cast<int>(a.position_O.y() / 3e-3F),
-              strip_b = static_cast<int>(b.position_O.y() / 3e-3F);
+    const int strip_a = static_cast<int>(a.position_O.y() / 3e-3F);
+    const int strip_b = static_cast<int>(b.position_O.y() / 3e-3F);
     if (strip_a != strip_b) return strip_a < strip_b;
     return strip_a % 2 ? a.position_O.x() > b.position_O.x() : a.position_O.x() < b.position_O.x();
   });
@@ -54,10 +54,12 @@ TEST(Ordering, VisitsEveryDotOnceAndTakesLessTime) {
   const CellDescription cell = default_cell();
   for (const std::size_t count : {3U, 10U, 500U, 5000U}) {
     const auto path = random_plate(count, 7);
-    const auto order = improved_order(cell, path, 0), kicked = improved_order(cell, path, 5);
+    const auto order = improved_order(cell, path, 0);
+    const auto kicked = improved_order(cell, path, 5);
     expect_permutation(order, count);
     expect_permutation(kicked, count);
-    const double before_s = path_s(cell, path, as_it_is(count)), after_s = path_s(cell, path, order);
+    const double before_s = path_s(cell, path, as_it_is(count));
+    const double after_s = path_s(cell, path, order);
     EXPECT_LE(after_s, before_s + 1e-6) << count;
     EXPECT_LE(path_s(cell, path, kicked), after_s + 1e-4) << count;
     if (count >= 500) {

@@ -23,7 +23,8 @@ TEST(StepCost, IsTheTimeModel) {
   constexpr int kMoves = 20'000;
   for (int n = 0; n < kMoves; ++n) {
     const double scale = std::pow(10., 2 * uniform(random) - 2);
-    Joints from = home_joints(cell), to = from;
+    Joints from = home_joints(cell);
+    Joints to = from;
     for (std::size_t i = 0; i < 4; ++i) to[i] += scale * uniform(random) * (i == kJ3 ? .1 : 1);
     const double expected_s = move_s(cell, from, to) + settle_s(cell, from, to) - cell.timing.settle_min_s;
     const double off_s = std::abs(static_cast<double>(cost(arm_of(from), arm_of(to))) - expected_s);
@@ -42,7 +43,8 @@ TEST(StepCost, WithATurnIsTheLeastOverTurnsAndSymmetric) {
   constexpr unsigned kSeed = 5;
   std::mt19937 random(kSeed);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  int helped = 0, apart = 0;
+  int helped = 0;
+  int apart = 0;
   constexpr int kSteps = 2000;
   for (int n = 0; n < kSteps; ++n) {
     const Eigen::Vector3d from_W(.26 + .03 * uniform(random), .03 * uniform(random), .15);

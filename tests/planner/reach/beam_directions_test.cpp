@@ -40,7 +40,8 @@ class Reference {
     if (-beam_O.dot(target.face_normal_O) < reach_.cos_max_incidence()) return false;
     if (bundle_.lens_touches(target.position_O, beam_O, wider_m)) return false;
     const auto& kinematics = reach_.kinematics();
-    const double low = kinematics.axis_min(kTilt), high = kinematics.axis_max(kTilt);
+    const double low = kinematics.axis_min(kTilt);
+    const double high = kinematics.axis_max(kTilt);
     constexpr int kTilts = 110;
     for (int a = 0; a <= kTilts; ++a) {
       const double tilt = low + (high - low) * a / kTilts;
@@ -72,7 +73,10 @@ class Reference {
 TEST(BeamDirections, AreAllThatHitADotAndNoOthers) {
   constexpr unsigned kSeed = 44;
   const BeamDirections directions(9 * kDegree);
-  std::size_t looks = 0, hitting = 0, misses = 0, cautious = 0;
+  std::size_t looks = 0;
+  std::size_t hitting = 0;
+  std::size_t misses = 0;
+  std::size_t cautious = 0;
   for (const TexturedMesh& mesh : {small_cup(), drilled_block(), ball(.03)}) {
     const Reach reach(mesh, default_cell(), {});
     const Reference reference(mesh, reach);

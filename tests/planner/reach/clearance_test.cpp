@@ -41,7 +41,10 @@ TEST(Clearance, SlackIsALowerBoundOnTheWayToTouching) {
 TEST(Clearance, FieldAgreesWithABundleOfRays) {
   constexpr unsigned kSeed = 41;
   const CellDescription cell = default_cell();
-  std::size_t looks = 0, misses = 0, touching = 0, cautious = 0;
+  std::size_t looks = 0;
+  std::size_t misses = 0;
+  std::size_t touching = 0;
+  std::size_t cautious = 0;
   for (const TexturedMesh& mesh : {small_cup(), drilled_block(), ball(.03)}) {
     const Clearance clearance(mesh, cell);
     const RayBundle reference(mesh, cell);
@@ -101,7 +104,8 @@ TEST(Clearance, LinksAgreeWithTheIndependentCheck) {
   const Kinematics kinematics(cell);
   const CheckCell check(mesh, cell);
   std::mt19937 random(kSeed);
-  std::size_t touching = 0, clear = 0;
+  std::size_t touching = 0;
+  std::size_t clear = 0;
   for (int n = 0; n < 20'000; ++n) {
     Joints joints = any_joints(cell, random);
     joints[kJ3] = std::min(joints[kJ3], .2);
@@ -133,7 +137,9 @@ TEST(Clearance, TheColumnAgreesWithTheIndependentCheck) {
   const Kinematics kinematics(cell);
   const CheckCell check(mesh, cell);
   std::mt19937 random(kSeed);
-  std::size_t tool = 0, table = 0, clear = 0;
+  std::size_t tool = 0;
+  std::size_t table = 0;
+  std::size_t clear = 0;
   for (int n = 0; n < 20'000; ++n) {
     Joints joints = any_joints(cell, random);
     joints[kTilt] = std::max(joints[kTilt], .8);  // the ball leans towards the robot

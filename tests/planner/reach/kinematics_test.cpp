@@ -37,7 +37,8 @@ TEST(Kinematics, InverseOfForwardIsTheSamePose) {
   const Kinematics kinematics(cell);
   constexpr unsigned kSeed = 11;
   std::mt19937 random(kSeed);
-  double worst_m = 0, worst_rad = 0;
+  double worst_m = 0;
+  double worst_rad = 0;
   for (int n = 0; n < pose_count(); ++n) {
     const Joints joints = random_joints(cell, random);
     if (std::abs(std::sin(joints[kJ2])) < 1e-3) continue;  // the straight arm, which planning keeps away from
@@ -74,7 +75,8 @@ TEST(Kinematics, RatesOverYawAreThoseOfTheInverse) {
     const Eigen::Vector3d focus_W = table.to_W(kinematics.tool_pose(joints).focus_O);
     const Elbow elbow = joints[kJ2] > 0 ? Elbow::kPositive : Elbow::kNegative;
     constexpr double kStep = 1e-6;
-    Joints before = joints, after = joints;
+    Joints before = joints;
+    Joints after = joints;
     ASSERT_TRUE(kinematics.solve_arm(focus_W, kinematics.yaw(joints) - kStep, elbow, before));
     ASSERT_TRUE(kinematics.solve_arm(focus_W, kinematics.yaw(joints) + kStep, elbow, after));
     const Joints rates = kinematics.per_yaw(joints);
@@ -190,7 +192,8 @@ TEST(Kinematics, WindingStaysNearAndInsideTheLimits) {
   std::mt19937 random(14);
   std::uniform_real_distribution<double> angle(-kPi, kPi), reference(-80, 80);
   for (int n = 0; n < 10'000; ++n) {
-    const double a = angle(random), near = reference(random);
+    const double a = angle(random);
+    const double near = reference(random);
     for (const std::size_t axis : {kJ4, kRotation}) {
       const double unwrapped = kinematics.unwrap_near(axis, a, near);
       ASSERT_NEAR(std::remainder(unwrapped - a, kTurn), 0, 1e-9);

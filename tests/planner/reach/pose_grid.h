@@ -6,7 +6,7 @@
 #include "sampling/base/angles.h"
 
 /// Brute force: every pose of a grid over tilt, rotation and yaw with either elbow, checked by the same rules as
-/// planning's but found in another way. Confirms that a dot that reach gave up is out of reach.
+/// planning's but found by another method. Confirms that dots which reach skips are out of reach.
 namespace hilbrush {
 
 struct PoseGridAnswer {

@@ -50,7 +50,8 @@ TEST(Reach, AHoleIsSeenAsDeepAsTheConeAllows) {
   const Reach reach(drilled_block(), cell, {});
   // At 45 degrees the beam clears the opposite rim, 8 mm across, from less than 8 mm below it. Facets take a little of
   // that.
-  const double top_m = .04, radius_m = .004 * std::cos(std::numbers::pi / 96);
+  const double top_m = .04;
+  const double radius_m = .004 * std::cos(std::numbers::pi / 96);
   for (const double depth_m : {.001, .004, .007})
     EXPECT_TRUE(reach.is_reachable({-radius_m, 0, top_m - depth_m}, {1, 0, 0})) << depth_m;
   for (const double depth_m : {.009, .012, .025}) {
@@ -181,7 +182,8 @@ TEST(Reach, FoundPosesAreWithinTheConeAndTheLimits) {
 }
 
 TEST(ObjectDistance, IsTheDistanceToABall) {
-  const double radius_m = .02, range_m = .04;
+  const double radius_m = .02;
+  const double range_m = .04;
   const ObjectDistance distance(ball(radius_m), range_m);
   const Vector3d center(0, 0, radius_m);
   std::mt19937 random(21);

@@ -14,11 +14,11 @@ namespace hilbrush {
 namespace {
 
 /// Looks at every hundredth of every leg.
-void expect_clear(const CheckCell& check, const CellDescription& cell, const std::vector<Joints>& way,
+void expect_clear(const CheckCell& check, const CellDescription& cell, const std::vector<Joints>& path,
                   const std::string& what) {
-  for (std::size_t leg = 1; leg < way.size(); ++leg)
+  for (std::size_t leg = 1; leg < path.size(); ++leg)
     for (double t = 0; t <= 1; t += .01) {
-      const Joints at = joints_during(cell, way[leg - 1], way[leg], t * move_s(cell, way[leg - 1], way[leg]));
+      const Joints at = joints_during(cell, path[leg - 1], path[leg], t * move_s(cell, path[leg - 1], path[leg]));
       ASSERT_EQ(check.body_fault(at), "") << what << ", leg " << leg;
     }
 }
@@ -44,18 +44,19 @@ TEST(Transit, WaysBetweenRandomPosesAreClear) {
     const DotSequence dots = scatter(mesh, 3e-3, kSeed);
     std::mt19937 random(kSeed);
     Joints now = home_joints(cell);
-    std::size_t found = 0, tried = 0;
+    std::size_t found = 0;
+    std::size_t tried = 0;
     for (int n = 0; n < 40; ++n) {
       const auto pose = reach.find_pose(target_of(dots.dots[random() % dots.dots.size()]), now).pose;
       if (!pose) continue;
       ++tried;
-      const auto way = transit.route_by_search(now, pose->joints);
-      if (!way) continue;
+      const auto path = transit.route_by_search(now, pose->joints);
+      if (!path) continue;
       ++found;
       std::vector<Joints> whole{now};
-      whole.insert(whole.end(), way->begin(), way->end());
+      whole.insert(whole.end(), path->begin(), path->end());
       whole.push_back(pose->joints);
-      expect_clear(check, cell, whole, "way " + std::to_string(n) + ", seed " + std::to_string(kSeed));
+      expect_clear(check, cell, whole, "path " + std::to_string(n) + ", seed " + std::to_string(kSeed));
       now = pose->joints;
     }
     EXPECT_GE(found, tried * 9 / 10);
@@ -69,7 +70,8 @@ TEST(Transit, TheSearchFindsWhatSimpleWaysMiss) {
   const Reach reach(mesh, cell, {});
   const Transit transit(reach);
   const DotSequence dots = scatter(mesh, 3e-3);
-  std::size_t simple = 0, searched = 0;
+  std::size_t simple = 0;
+  std::size_t searched = 0;
   for (std::size_t i = 0; i < dots.dots.size(); i += 29) {
     const auto pose = reach.find_pose(target_of(dots.dots[i]), home_joints(cell)).pose;
     if (!pose) continue;
