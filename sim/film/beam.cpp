@@ -8,12 +8,14 @@ namespace hilbrush {
 namespace {
 
 Eigen::Vector3d about_y(double angle, const Eigen::Vector3d& v) {
-  const double c = std::cos(angle), s = std::sin(angle);
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
   return {c * v.x() + s * v.z(), v.y(), c * v.z() - s * v.x()};
 }
 
 Eigen::Vector3d about_z(double angle, const Eigen::Vector3d& v) {
-  const double c = std::cos(angle), s = std::sin(angle);
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
   return {c * v.x() - s * v.y(), s * v.x() + c * v.y(), v.z()};
 }
 

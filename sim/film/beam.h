@@ -4,13 +4,13 @@
 #include "planner/cell_model/cell_description.h"
 
 /// Where the light goes, from joint values alone. Written from the frames described in
-/// planner/cell_model/cell_description.h and sharing no code with the planner's kinematics: it is there to catch their
+/// planner/cell_model/cell_description.h and sharing no code with the planner's kinematics, so that it detects their
 /// faults.
 namespace hilbrush {
 
 struct Beam {
   Eigen::Vector3d focus_O;
-  Eigen::Vector3d direction_O;  ///< unit, the way the light travels
+  Eigen::Vector3d direction_O;  ///< unit, in the direction of the light
 };
 
 Beam beam_from_joints(const CellDescription& cell, const Joints& joints);

@@ -34,12 +34,14 @@ TexturedMesh black_field(double width_m, double height_m) {
 
 /// Mean coverage of the field but for its border, by an even lattice of places a third of a pitch apart.
 double read_field(const Film& film, double width_m, double height_m) {
-  const double border_m = kFieldBorder * film.pitch_m(), step_m = film.pitch_m() / 3;
+  const double border_m = kFieldBorder * film.pitch_m();
+  const double step_m = film.pitch_m() / 3;
   double sum = 0;
   long count = 0;
   for (double y = border_m; y <= height_m - border_m; y += step_m)
     for (double x = border_m; x <= width_m - border_m; x += step_m) {
-      const double u = x / width_m, v = y / height_m;
+      const double u = x / width_m;
+      const double v = y / height_m;
       sum += u >= v ? film.painted({0, {1 - u, u - v, v}}) : film.painted({1, {1 - v, u, v - u}});
       ++count;
     }
@@ -140,7 +142,8 @@ ToneCurve tone_curve_of(const std::vector<WedgeStep>& steps, double asked_max, s
   ToneCurve curve;
   const auto add = [&](double wanted, double asked) {
     const double least = curve.asked.empty() ? 0 : curve.asked.back();
-    curve.wanted.push_back(wanted), curve.asked.push_back(std::max(least, asked));
+    curve.wanted.push_back(wanted);
+    curve.asked.push_back(std::max(least, asked));
   };
   auto level = of_level.begin();
   for (int i = 0; i <= kTones; ++i) {

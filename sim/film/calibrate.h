@@ -16,7 +16,7 @@ struct WedgeStep {
   double painted = 0;  ///< mean coverage read back
 };
 
-/// Paints and reads the steps of a wedge; the simulated one is wedge_on_film(), a real one is measured by hand.
+/// Paints and reads the steps of a wedge; wedge_on_film() simulates it, a real one is measured by hand.
 using Wedge = std::function<std::vector<WedgeStep>(const std::vector<double>& asked)>;
 
 /// The wedge of the simulated film: each step is a field of flat surface on which `options` place dots at this pitch
@@ -25,8 +25,8 @@ using Wedge = std::function<std::vector<WedgeStep>(const std::vector<double>& as
 Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOptions& options);
 
 /// Inverts the wedge's response: for the wanted tones 0, .1 .. .9, 1 and, where the paint's response bends most, .05,
-/// .75, .85, .95 and .98 the coverage to ask for, at most asked_max. Paints up to six wedges, each asking for what the
-/// ones before suggest, until every step that can be reached reads within .003 of what is wanted.
+/// .75, .85, .95 and .98 the coverage to ask for, at most asked_max. Paints up to six wedges, each with the values that
+/// the ones before suggest, until every step that can be reached reads within .003 of what is wanted.
 /// @throws InputError if the wedge has too few readings or shows no paint at all.
 ToneCurve calibrate_tone(const Wedge& wedge, double asked_max);
 

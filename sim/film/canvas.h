@@ -9,7 +9,7 @@ namespace hilbrush {
 
 using Color = std::array<std::uint8_t, 3>;  ///< sRGB
 
-/// An RGB picture to compose on. What falls outside is cut off.
+/// An RGB picture to draw on. Pixels outside are ignored.
 class Canvas {
  public:
   Canvas(int width, int height, Color background);

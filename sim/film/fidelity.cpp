@@ -45,7 +45,8 @@ std::vector<Reading> stratified_points(const TexturedMesh& mesh, std::uint64_t s
     const double place = (i + uniform(seed, 3 * i)) / kSampleCount * area;
     const auto t = std::min<std::size_t>(std::upper_bound(area_to.begin(), area_to.end(), place) - area_to.begin(),
                                          area_to.size() - 1);
-    const double root = std::sqrt(uniform(seed, 3 * i + 1)), v = uniform(seed, 3 * i + 2);
+    const double root = std::sqrt(uniform(seed, 3 * i + 1));
+    const double v = uniform(seed, 3 * i + 2);
     readings[i].point = {static_cast<std::uint32_t>(t), {1 - root, root * (1 - v), root * v}};
   }
   return readings;
@@ -114,8 +115,9 @@ class ReachMap {
       if (found == cells_.end()) continue;
       for (const std::uint32_t i : found->second) {
         const double distance = (position(mesh_, readings_[i].point) - p_O).squaredNorm();
-        if (distance < nearest && face_normal(mesh_, readings_[i].point).dot(normal_O) > .5)
-          nearest = distance, reachable = readings_[i].is_reachable;
+        if (!(distance < nearest && face_normal(mesh_, readings_[i].point).dot(normal_O) > .5)) continue;
+        nearest = distance;
+        reachable = readings_[i].is_reachable;
       }
     }
     return reachable;
@@ -156,7 +158,8 @@ MaskedImage ssim(const MaskedImage& picture) {
   MaskedImage products(picture.width, picture.height, 5);
   products.weights = picture.weights;
   for (std::size_t i = 0; i < picture.weights.size(); ++i) {
-    const float a = picture.channels[0][i], b = picture.channels[1][i];
+    const float a = picture.channels[0][i];
+    const float b = picture.channels[1][i];
     const std::array<float, 5> values{a, b, a * a, b * b, a * b};
     for (int k = 0; k < 5; ++k) products.channels[k][i] = values[k];
   }
@@ -164,9 +167,11 @@ MaskedImage ssim(const MaskedImage& picture) {
   MaskedImage similarity(picture.width, picture.height, 1);
   similarity.weights = means.weights;
   for (std::size_t i = 0; i < means.weights.size(); ++i) {
-    const double a = means.channels[0][i], b = means.channels[1][i];
-    const double variance_a = means.channels[2][i] - a * a, variance_b = means.channels[3][i] - b * b,
-                 covariance = means.channels[4][i] - a * b;
+    const double a = means.channels[0][i];
+    const double b = means.channels[1][i];
+    const double variance_a = means.channels[2][i] - a * a;
+    const double variance_b = means.channels[3][i] - b * b;
+    const double covariance = means.channels[4][i] - a * b;
     similarity.channels[0][i] = static_cast<float>((2 * a * b + kC1) * (2 * covariance + kC2) /
                                                    ((a * a + b * b + kC1) * (variance_a + variance_b + kC2)));
   }
@@ -185,17 +190,23 @@ class ViewSimilarity {
         const std::size_t i = similarity.index(x, y);
         if (!(similarity.weights[i] > 0)) continue;
         const double value = similarity.channels[0][i];
-        whole_sum_ += value, whole_count_ += 1;
-        const int view_x = std::min(x * step + step / 2, view.width() - 1),
-                  view_y = std::min(y * step + step / 2, view.height() - 1);
-        if (reach.is_reachable(view.pixel(view_x, view_y).point)) reachable_sum_ += value, reachable_count_ += 1;
+        whole_sum_ += value;
+        whole_count_ += 1;
+        const int view_x = std::min(x * step + step / 2, view.width() - 1);
+        const int view_y = std::min(y * step + step / 2, view.height() - 1);
+        if (!reach.is_reachable(view.pixel(view_x, view_y).point)) continue;
+        reachable_sum_ += value;
+        reachable_count_ += 1;
       }
   }
   double whole() const { return whole_count_ > 0 ? whole_sum_ / whole_count_ : 0; }
   double reachable() const { return reachable_count_ > 0 ? reachable_sum_ / reachable_count_ : 0; }
 
  private:
-  double whole_sum_ = 0, whole_count_ = 0, reachable_sum_ = 0, reachable_count_ = 0;
+  double whole_sum_ = 0;
+  double whole_count_ = 0;
+  double reachable_sum_ = 0;
+  double reachable_count_ = 0;
 };
 
 /// Fills wanted (channel 0) and painted (channel 1) coverage of what the view shows.
@@ -217,9 +228,9 @@ MaskedImage look(const Film& film, const ToneField& tone, const OrthographicView
 
 /// A third of a pitch; more for objects so large that a view would take more than some 24 million pixels.
 double measuring_pixel_m(const Film& film) {
-  constexpr double kPixelsMax = 24e6;
+  constexpr double kMaxPixels = 24e6;
   const auto [low, high] = bounds(film.mesh());
-  return std::max(film.pitch_m() / 3, (high - low).norm() / std::sqrt(kPixelsMax));
+  return std::max(film.pitch_m() / 3, (high - low).norm() / std::sqrt(kMaxPixels));
 }
 
 }  // namespace

@@ -15,13 +15,13 @@ struct FidelityFigures {
 };
 
 struct Fidelity {
-  FidelityFigures reachable;  ///< over surface whose own reach test passes
+  FidelityFigures reachable;  ///< over the surface that passes the reach test
   FidelityFigures whole;
   double unreachable_share = 0;  ///< of the area
 };
 
-/// Whether the surface at a point can be exposed at all (the planner's Reach, passed in by whoever has it). Called from
-/// several threads at a time; empty: all of it can.
+/// Whether the surface at a point can be exposed at all (the caller passes in the planner's Reach). Called from several
+/// threads at a time. If empty, all of the surface can.
 using ReachTest = std::function<bool(const SurfacePoint&)>;
 
 /// At 20,000 points, one in each of as many strata of equal area, and in six views at 3 pixels a pitch (fewer if a view

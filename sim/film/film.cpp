@@ -19,7 +19,7 @@ namespace {
 /// threads.
 constexpr std::size_t kBatch = 1 << 16;
 constexpr std::size_t kChunk = 1 << 10;
-/// A beam that lands so far before its focus met something on the way.
+/// m: a beam that lands this far before its focus was blocked by something.
 constexpr double kShadowM = 1e-4;
 
 /// A spot touches a tile: ordered by tile, then by spot.
@@ -178,7 +178,8 @@ double Film::painted(double dose_j_m2) const {
 void Film::points_near(const SurfacePoint& center, double radius_m, std::vector<FilmPoint>& points) const {
   thread_local std::vector<std::uint32_t> triangles;
   points.clear();
-  const Eigen::Vector3d center_O = position(mesh(), center), normal_O = face_normal(mesh(), center);
+  const Eigen::Vector3d center_O = position(mesh(), center);
+  const Eigen::Vector3d normal_O = face_normal(mesh(), center);
   implementation_->index.triangles_near(center_O, std::sqrt(2.) * radius_m, triangles);
   for (const std::uint32_t triangle : triangles)
     if (mesh().area_vector(triangle).dot(normal_O) > 0)

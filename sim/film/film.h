@@ -10,11 +10,11 @@
 #include "sim/devices/emission_record.h"
 #include "sim/film/film_lattice.h"
 
-/// The film: what the emissions expose on the object's surface, developed afterwards from their record.
-/// Each emission is a beam from the pose its joints give (beam.h: forward kinematics of this folder's own), cast from
+/// The film: what the emissions expose on the object's surface, computed afterwards from their record.
+/// Each emission is a beam from the pose of its joints (beam.h: independent forward kinematics), cast from
 /// the lens onto the mesh (surface_index.h): a Gaussian spot, elliptical when oblique, larger when out of focus. Its
-/// dose gathers on small lattices of spacing pitch/2 on the triangles (film_lattice.h), on those that face the beam and
-/// lie within two cut radii of depth of where it hit.
+/// dose is summed on small lattices of spacing pitch/2 on the triangles (film_lattice.h), on those that face the beam
+/// and lie within two cut radii of depth of where it hit.
 namespace hilbrush {
 
 struct Hit {
@@ -28,8 +28,8 @@ struct Hit {
 
 class Film {
  public:
-  /// Keeps references to mesh and cell, which must outlive it. @throws InputError if the film would need more memory
-  /// than is sensible.
+  /// Keeps references to mesh and cell, which must outlive it. @throws InputError if the film would need more nodes
+  /// than FilmLattice::kMaxNodes.
   Film(const TexturedMesh& mesh, const CellDescription& cell, double pitch_m);
   ~Film();
   Film(Film&&) noexcept;
@@ -37,7 +37,7 @@ class Film {
   /// Adds the emissions' dose; returns where each landed (same order). Bit-identical for any number of threads.
   /// Cost: O(emissions), some .6 M a second and core.
   std::vector<Hit> expose(std::span<const Emission> emissions, const Progress& progress = {});
-  /// Adds dose straight at given surface points at normal incidence, as a perfect cell would: for calibration. A level
+  /// Adds dose directly at given surface points at normal incidence, as a perfect cell would: for calibration. A level
   /// of 1 is the full energy.
   void expose_at(std::span<const SurfacePoint> points, std::span<const float> levels);
 

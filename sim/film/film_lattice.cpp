@@ -14,9 +14,10 @@ namespace hilbrush {
 
 namespace {
 
-/// Beyond this much of the beam's direction along the face there is no dose: grazing light, and faces that look away.
+/// Beyond this much of the beam's direction along the face there is no dose: grazing light, and faces turned away.
 constexpr double kGrazingCosine = .02;
-/// Light is followed so many cut radii before and behind the place it hit: enough for incidences up to 63 degrees.
+/// Light is followed this many cut radii before and behind the point that it hit: enough for incidences up to 63
+/// degrees.
 constexpr double kDepthWindow = 2;
 
 std::uint32_t steps_over(double length_m, double spacing_m) {
@@ -28,7 +29,10 @@ int corner_opposite_longest_edge(const TexturedMesh& mesh, std::size_t t) {
   double longest = -1;
   for (int c = 0; c < 3; ++c) {
     const double squared = (mesh.corner(t, (c + 1) % 3) - mesh.corner(t, (c + 2) % 3)).squaredNorm();
-    if (squared > longest) longest = squared, apex = c;
+    if (squared > longest) {
+      longest = squared;
+      apex = c;
+    }
   }
   return apex;
 }
@@ -51,19 +55,24 @@ struct FilmLattice::Frame {
   RowRange lines_near(double y0, std::uint32_t count) const {
     const double stretch = along.norm();  // > 0 unless the axis runs along the rows: then nothing faces it
     if (!(stretch > 0)) return {0, 0};
-    const double step = row_step(), first = cross(along, start + y0 * up) / stretch,
-                 rise = cross(along, up) / stretch * step;
-    double low = 0, high = count - 1.;
+    const double step = row_step();
+    const double first = cross(along, start + y0 * up) / stretch;
+    const double rise = cross(along, up) / stretch * step;
+    double low = 0;
+    double high = count - 1.;
     if (rise != 0) {
-      const double j1 = (-radius - first) / rise, j2 = (radius - first) / rise;
+      const double j1 = (-radius - first) / rise;
+      const double j2 = (radius - first) / rise;
       low = std::max(low, std::ceil(std::min(j1, j2))), high = std::min(high, std::floor(std::max(j1, j2)));
     } else if (std::abs(first) > radius) {
       return {0, 0};
     }
     if (low > high) return {0, 0};
-    const double reach = radius / stretch, slack = column_step();
+    const double reach = radius / stretch;
+    const double slack = column_step();
     const auto nearest = [&](double line) { return -along.dot(start + (y0 + line * step) * up) / (stretch * stretch); };
-    const double s1 = nearest(low), s2 = nearest(high);
+    const double s1 = nearest(low);
+    const double s2 = nearest(high);
     if (std::max(s1, s2) + reach < -slack || std::min(s1, s2) - reach > grid.length_m + slack) return {0, 0};
     return {static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high) + 1};
   }
@@ -72,14 +81,18 @@ struct FilmLattice::Frame {
   /// height y, that lie within the radius.
   template <class Visit>
   void visit_line(double y, double s0, double step, std::uint32_t count, Visit visit) const {
-    const Eigen::Vector2d place = start + y * up + s0 * along, delta = step * along;
-    const double a = delta.squaredNorm(), b = place.dot(delta), c = place.squaredNorm();
+    const Eigen::Vector2d place = start + y * up + s0 * along;
+    const Eigen::Vector2d delta = step * along;
+    const double a = delta.squaredNorm();
+    const double b = place.dot(delta);
+    const double c = place.squaredNorm();
     const double discriminant = b * b - a * (c - radius * radius);
     if (discriminant < 0 || !(a > 0)) return;
     const double root = std::sqrt(discriminant);
-    const double low = std::max(std::ceil((-b - root) / a), 0.),
-                 high = std::min(std::floor((-b + root) / a), count - 1.);
-    const double depth = start_depth + y * up_depth + s0 * along_depth, depth_step = step * along_depth;
+    const double low = std::max(std::ceil((-b - root) / a), 0.);
+    const double high = std::min(std::floor((-b + root) / a), count - 1.);
+    const double depth = start_depth + y * up_depth + s0 * along_depth;
+    const double depth_step = step * along_depth;
     for (double i = low; i <= high; ++i)
       visit(static_cast<std::uint32_t>(i), c + i * (2 * b + i * a), depth + i * depth_step);
   }
@@ -92,9 +105,7 @@ FilmLattice::Frame FilmLattice::frame_of(std::uint32_t triangle, const Eigen::Ve
   const Eigen::Vector3d along = (mesh_.corner(triangle, (grid.apex + 2) % 3) - origin).normalized();
   const Eigen::Vector3d up = mesh_.area_vector(triangle).cross(along).normalized();
   const Eigen::Matrix3d axes = frame_about(axis_O);
-  const auto across = [&](const Eigen::Vector3d& v) {
-    return Eigen::Vector2d(axes.col(0).dot(v), axes.col(1).dot(v));
-  };
+  const auto across = [&](const Eigen::Vector3d& v) { return Eigen::Vector2d(axes.col(0).dot(v), axes.col(1).dot(v)); };
   const Eigen::Vector3d from_axis = origin - center_O;
   return {across(from_axis), across(along),  across(up), axis_O.dot(from_axis),
           axis_O.dot(along), axis_O.dot(up), radius_m,   grid};
@@ -116,9 +127,9 @@ FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mes
     grid.columns = steps_over(length_m, spacing_m);
     grid.rows = steps_over(grid.height_m, spacing_m);
     node_estimate += (.5 * grid.columns + 2) * (grid.rows + 1.);
-    if (node_estimate > kNodeLimit)
+    if (node_estimate > kMaxNodes)
       throw InputError("", "the film of this object would need more than " +
-                               std::to_string(static_cast<long>(kNodeLimit / 1e6)) +
+                               std::to_string(static_cast<long>(kMaxNodes / 1e6)) +
                                " million nodes: choose a smaller size or a lower dpi");
     grid.rows_per_tile =
         static_cast<std::uint16_t>(std::clamp(kTileNodes / (grid.columns + 1), kTileRowsMin, kTileRowsMax));
@@ -132,8 +143,8 @@ FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mes
     for (std::uint32_t row = 0; row <= grid.rows; ++row) {
       // The triangle narrows upwards, so what it is widest in, of the strips below and above the row, is the lower line
       // of the one below.
-      const double share = row > 0 ? (row - 1.) / grid.rows : 0,
-                   foot = grid.length_m > 0 ? grid.foot_m / grid.length_m : 0;
+      const double share = row > 0 ? (row - 1.) / grid.rows : 0;
+      const double foot = grid.length_m > 0 ? grid.foot_m / grid.length_m : 0;
       const auto first =
           static_cast<std::uint32_t>(std::clamp(std::floor(share * foot * grid.columns), 0., grid.columns - 1.));
       const double end = std::ceil((1 - share * (1 - foot)) * grid.columns);
@@ -153,7 +164,8 @@ void FilmLattice::append_tiles(std::uint32_t triangle, const Spot& spot, std::ve
   const Frame frame = frame_of(triangle, spot.center_O, spot.direction_O, kSpotCutRadii * spot.radius_m);
   const RowRange rows = frame.lines_near(0, grid.rows + 1);
   if (rows.first >= rows.end) return;
-  const std::uint32_t first_tile = rows.first / grid.rows_per_tile, last_tile = (rows.end - 1) / grid.rows_per_tile;
+  const std::uint32_t first_tile = rows.first / grid.rows_per_tile;
+  const std::uint32_t last_tile = (rows.end - 1) / grid.rows_per_tile;
   for (std::uint32_t tile = first_tile; tile <= last_tile; ++tile) tiles.push_back(grid.first_tile + tile);
 }
 
@@ -168,10 +180,13 @@ void FilmLattice::expose(std::uint32_t tile, std::span<const Spot* const> spots)
   for (const Spot* spot : spots) {
     const Frame frame = frame_of(triangle, spot->center_O, spot->direction_O, kSpotCutRadii * spot->radius_m);
     const RowRange near = frame.lines_near(0, grid.rows + 1);
-    const double radius2 = spot->radius_m * spot->radius_m, cosine = -spot->direction_O.dot(normal_O);
+    const double radius2 = spot->radius_m * spot->radius_m;
+    const double cosine = -spot->direction_O.dot(normal_O);
     const auto peak = static_cast<float>(2 * spot->energy_j * cosine / (std::numbers::pi * radius2 * kInside));
     const auto falloff = static_cast<float>(-2 / radius2);
-    const double window = kDepthWindow * frame.radius, row_step = frame.row_step(), column_step = frame.column_step();
+    const double window = kDepthWindow * frame.radius;
+    const double row_step = frame.row_step();
+    const double column_step = frame.column_step();
     for (std::uint32_t j = std::max(near.first, tile_first); j < std::min(near.end, tile_end); ++j) {
       const Row& row = rows_[grid.first_row + j];
       const std::uint32_t count = rows_[grid.first_row + j + 1].first_node - row.first_node;
@@ -189,7 +204,8 @@ FilmLattice::Neighbors FilmLattice::neighbors(const SurfacePoint& point) const {
   const double apex = std::clamp(point.barycentric[grid.apex], 0., 1.);
   const double end = std::clamp(point.barycentric[(grid.apex + 2) % 3], 0., 1.);
   const double foot = grid.length_m > 0 ? grid.foot_m / grid.length_m : 0;
-  const double y = apex * grid.rows, s = std::min(end + apex * foot, 1.) * grid.columns;
+  const double y = apex * grid.rows;
+  const double s = std::min(end + apex * foot, 1.) * grid.columns;
   const std::uint32_t lower = std::min(static_cast<std::uint32_t>(y), grid.rows - 1);
   Neighbors neighbors;
   for (std::uint32_t k = 0; k < 2; ++k) {
@@ -197,7 +213,8 @@ FilmLattice::Neighbors FilmLattice::neighbors(const SurfacePoint& point) const {
     const std::uint32_t steps = rows_[grid.first_row + lower + k + 1].first_node - row.first_node - 1;
     const double place = std::clamp(s - row.first_column, 0., static_cast<double>(steps));
     const std::uint32_t i = std::min(static_cast<std::uint32_t>(place), steps - 1);
-    const double row_weight = k == 0 ? 1 - (y - lower) : y - lower, along = place - i;
+    const double row_weight = k == 0 ? 1 - (y - lower) : y - lower;
+    const double along = place - i;
     for (std::uint32_t n = 0; n < 2; ++n) {
       neighbors.doses_j_m2[2 * k + n] = doses_[row.first_node + i + n];
       neighbors.weights[2 * k + n] = row_weight * (n == 0 ? 1 - along : along);
@@ -212,31 +229,35 @@ void FilmLattice::append_points(std::uint32_t triangle, const Eigen::Vector3d& c
   const Grid& grid = grids_[triangle];
   if (!(grid.height_m > 0)) return;
   const Frame frame = frame_of(triangle, center_O, normal_O, radius_m);
-  const double row_step = frame.row_step(), column_step = frame.column_step();
+  const double row_step = frame.row_step();
+  const double column_step = frame.column_step();
   const RowRange rows = frame.lines_near(0, grid.rows + 1);
   for (std::uint32_t j = rows.first; j < rows.end; ++j) {
     const Row& row = rows_[grid.first_row + j];
     const std::uint32_t count = rows_[grid.first_row + j + 1].first_node - row.first_node;
     // The band of half a step below to half a step above the row is a trapezium: its width at mid-height times its
     // height is its area.
-    const double low = std::max(j - .5, 0.) / grid.rows,
-                 high = std::min(j + .5, static_cast<double>(grid.rows)) / grid.rows;
-    const double middle = .5 * (low + high), left = middle * grid.foot_m, right = left + (1 - middle) * grid.length_m;
-    frame.visit_line(
-        j * row_step, row.first_column * column_step, column_step, count, [&](std::uint32_t i, double, double depth) {
-          const double place = (row.first_column + i) * column_step;
-          const double from = std::max(place - .5 * column_step, left), to = std::min(place + .5 * column_step, right);
-          if (from >= to || std::abs(depth) > radius_m) return;
-          const double t = (.5 * (from + to) - left) / (right - left);
-          FilmPoint& film_point = points.emplace_back();
-          film_point.point.triangle = triangle;
-          film_point.point.barycentric[grid.apex] = middle;
-          film_point.point.barycentric[(grid.apex + 1) % 3] = (1 - middle) * (1 - t);
-          film_point.point.barycentric[(grid.apex + 2) % 3] = (1 - middle) * t;
-          film_point.position_O = position(mesh_, film_point.point);
-          film_point.area_m2 = (to - from) * (high - low) * grid.height_m;
-          film_point.dose_j_m2 = doses_[row.first_node + i];
-        });
+    const double low = std::max(j - .5, 0.) / grid.rows;
+    const double high = std::min(j + .5, static_cast<double>(grid.rows)) / grid.rows;
+    const double middle = .5 * (low + high);
+    const double left = middle * grid.foot_m;
+    const double right = left + (1 - middle) * grid.length_m;
+    frame.visit_line(j * row_step, row.first_column * column_step, column_step, count,
+                     [&](std::uint32_t i, double, double depth) {
+                       const double place = (row.first_column + i) * column_step;
+                       const double from = std::max(place - .5 * column_step, left);
+                       const double to = std::min(place + .5 * column_step, right);
+                       if (from >= to || std::abs(depth) > radius_m) return;
+                       const double t = (.5 * (from + to) - left) / (right - left);
+                       FilmPoint& film_point = points.emplace_back();
+                       film_point.point.triangle = triangle;
+                       film_point.point.barycentric[grid.apex] = middle;
+                       film_point.point.barycentric[(grid.apex + 1) % 3] = (1 - middle) * (1 - t);
+                       film_point.point.barycentric[(grid.apex + 2) % 3] = (1 - middle) * t;
+                       film_point.position_O = position(mesh_, film_point.point);
+                       film_point.area_m2 = (to - from) * (high - low) * grid.height_m;
+                       film_point.dose_j_m2 = doses_[row.first_node + i];
+                     });
   }
 }
 

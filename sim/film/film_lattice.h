@@ -11,11 +11,11 @@ namespace hilbrush {
 /// One spot of light where it landed.
 struct Spot {
   Eigen::Vector3d center_O = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction_O = Eigen::Vector3d::UnitZ();  ///< unit, the way the light travels
+  Eigen::Vector3d direction_O = Eigen::Vector3d::UnitZ();  ///< unit, in the direction of the light
   double energy_j = 0;
   double radius_m = 0;  ///< 1/e2, across the beam
 };
-/// Light is followed to this many 1/e2 radii from the axis; the .3 % outside is spread over the inside.
+/// A spot ends at this many 1/e2 radii from its axis; the .3 % of its energy outside are spread over the inside.
 inline constexpr double kSpotCutRadii = 1.7;
 
 /// A node of the film and the piece of surface it stands for, by the middle of the piece.
@@ -29,14 +29,14 @@ struct FilmPoint {
 /// The dose on a mesh: one float at each node of a small rectangular grid on each triangle. Rows run along the
 /// triangle's longest edge, from there to its apex; rows, and nodes along a row, are at most `spacing` apart. A row
 /// keeps the nodes that interpolation inside the triangle needs, which at the border lie just outside, in the
-/// triangle's plane. A needle so gets as many nodes as its area and border need, where a barycentric lattice would get
-/// the square of its length. Between nodes the dose is bilinear. Rows are grouped into tiles; different tiles may be
-/// exposed by different threads at a time.
+/// triangle's plane. A narrow triangle thus gets as many nodes as its area and border need; a barycentric lattice would
+/// have the square of its length. Between nodes the dose is bilinear. Rows are grouped into tiles; different tiles may
+/// be exposed by different threads at a time.
 class FilmLattice {
  public:
-  /// Keeps a reference to `mesh`. @throws InputError if it would take more than kNodeLimit nodes.
+  /// Keeps a reference to `mesh`. @throws InputError if it would take more than kMaxNodes nodes.
   FilmLattice(const TexturedMesh& mesh, double spacing_m);
-  static constexpr double kNodeLimit = 600e6;
+  static constexpr double kMaxNodes = 600e6;
 
   /// Appends the tiles of `triangle` that the spot may reach; none if the triangle faces away.
   void append_tiles(std::uint32_t triangle, const Spot& spot, std::vector<std::uint32_t>& tiles) const;
@@ -49,7 +49,7 @@ class FilmLattice {
     std::array<double, 4> weights;
   };
   Neighbors neighbors(const SurfacePoint& point) const;
-  /// Shares `triangle` out among its nodes, in pieces whose areas add up to its own, and appends the nodes that lie
+  /// Divides `triangle` among its nodes, into pieces whose areas add up to its own, and appends the nodes that lie
   /// within radius_m of the axis through center_O along normal_O, and within radius_m of depth.
   void append_points(std::uint32_t triangle, const Eigen::Vector3d& center_O, const Eigen::Vector3d& normal_O,
                      double radius_m, std::vector<FilmPoint>& points) const;

@@ -18,10 +18,11 @@ std::vector<float> gaussian_taps(double sigma) {
   return taps;
 }
 
-/// One plane, blurred along the rows (at every step-th column), transposed on the way out: twice gives both directions.
+/// One plane, blurred along the rows (at every step-th column), and transposed: twice gives both directions.
 std::vector<float> blur_rows(const std::vector<float>& plane, int width, int height, const std::vector<float>& taps,
                              int step) {
-  const int out_width = (width + step / 2) / step, radius = static_cast<int>(taps.size() / 2);
+  const int out_width = (width + step / 2) / step;
+  const int radius = static_cast<int>(taps.size() / 2);
   std::vector<float> out(static_cast<std::size_t>(out_width) * height);
   constexpr int kRows = 16;
   tbb::parallel_for(0, (height + kRows - 1) / kRows, [&](int band) {
@@ -31,7 +32,8 @@ std::vector<float> blur_rows(const std::vector<float>& plane, int width, int hei
       if (first_lit == width) continue;
       for (int i = 0; i < out_width; ++i) {
         const int x = std::min(i * step + step / 2, width - 1);
-        const int begin = std::max(x - radius, static_cast<int>(first_lit)), end = std::min(x + radius, width - 1);
+        const int begin = std::max(x - radius, static_cast<int>(first_lit));
+        const int end = std::min(x + radius, width - 1);
         if (end < begin) continue;
         const Eigen::Index count = end - begin + 1;
         const Eigen::Map<const Eigen::VectorXf> values(row + begin, count), weights(&taps[begin - x + radius], count);
@@ -52,7 +54,8 @@ MaskedImage::MaskedImage(int w, int h, int channel_count)
 
 MaskedImage masked_blur(const MaskedImage& image, double sigma_pixels, int step) {
   const std::vector<float> taps = gaussian_taps(sigma_pixels);
-  const int out_width = (image.width + step / 2) / step, out_height = (image.height + step / 2) / step;
+  const int out_width = (image.width + step / 2) / step;
+  const int out_height = (image.height + step / 2) / step;
   const auto blur = [&](const std::vector<float>& plane) {
     const std::vector<float> across = blur_rows(plane, image.width, image.height, taps, step);
     return blur_rows(across, image.height, out_width, taps, step);
@@ -68,8 +71,8 @@ MaskedImage masked_blur(const MaskedImage& image, double sigma_pixels, int step)
   }
   for (int y = 0; y < out_height; ++y)
     for (int x = 0; x < out_width; ++x) {
-      const int from_x = std::min(x * step + step / 2, image.width - 1),
-                from_y = std::min(y * step + step / 2, image.height - 1);
+      const int from_x = std::min(x * step + step / 2, image.width - 1);
+      const int from_y = std::min(y * step + step / 2, image.height - 1);
       out.weights[out.index(x, y)] = image.weights[image.index(from_x, from_y)];
     }
   return out;

@@ -31,7 +31,8 @@ OrthographicView::OrthographicView(const TexturedMesh& mesh, const ViewDirection
       forward_O_(direction.forward_O),
       pixel_m_(pixel_m) {
   constexpr double kForever = std::numeric_limits<double>::infinity();
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(kForever), high = -low;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(kForever);
+  Eigen::Vector2d high = -low;
   for (const auto& triangle : mesh.triangles)
     for (const std::uint32_t vertex : triangle) {
       const Eigen::Vector2d place(right_O_.dot(mesh.vertices[vertex]), up_O_.dot(mesh.vertices[vertex]));
@@ -52,20 +53,23 @@ Eigen::Vector3d OrthographicView::project(const Eigen::Vector3d& p_O) const {
 }
 
 void OrthographicView::fill(std::uint32_t triangle) {
-  const Eigen::Vector3d a = project(mesh_.corner(triangle, 0)), b = project(mesh_.corner(triangle, 1)),
-                        c = project(mesh_.corner(triangle, 2));
+  const Eigen::Vector3d a = project(mesh_.corner(triangle, 0));
+  const Eigen::Vector3d b = project(mesh_.corner(triangle, 1));
+  const Eigen::Vector3d c = project(mesh_.corner(triangle, 2));
   const PlaneCoordinates coordinates(a, b, c);
   if (!coordinates.is_valid) return;
   const Eigen::Vector3d depths(a.z(), b.z(), c.z());
-  const double x_min = std::min({a.x(), b.x(), c.x()}), x_max = std::max({a.x(), b.x(), c.x()});
+  const double x_min = std::min({a.x(), b.x(), c.x()});
+  const double x_max = std::max({a.x(), b.x(), c.x()});
   const int first_row = std::max(0, static_cast<int>(std::ceil(std::min({a.y(), b.y(), c.y()}) - .5)));
   const int last_row = std::min(height_ - 1, static_cast<int>(std::floor(std::max({a.y(), b.y(), c.y()}) - .5)));
-  // Along an outline a front and a back face meet at equal depth: the front, which carries the film, shall win.
+  // Along an outline a front and a back face meet at equal depth: the front, which has the film, is shown.
   const double behind_m = mesh_.area_vector(triangle).dot(forward_O_) < 0 ? 0 : .05 * pixel_m_;
   constexpr double kRounding = 1e-9;  // neighbors share their border's pixels rather than leave gaps
   for (int row = first_row; row <= last_row; ++row) {
     const Eigen::Vector3d at_left = coordinates.constant + (row + .5) * coordinates.dy;
-    double low = x_min, high = x_max;
+    double low = x_min;
+    double high = x_max;
     for (int k = 0; k < 3; ++k) {
       const double slope = coordinates.dx[k];
       const double border = -(at_left[k] + kRounding) / slope;
@@ -76,9 +80,10 @@ void OrthographicView::fill(std::uint32_t triangle) {
       else if (at_left[k] < -kRounding)
         high = low - 1;
     }
-    const int first = std::max(0, static_cast<int>(std::ceil(low - .5))),
-              last = std::min(width_ - 1, static_cast<int>(std::floor(high - .5)));
-    const double depth_start = depths.dot(at_left) + behind_m, depth_step = depths.dot(coordinates.dx);
+    const int first = std::max(0, static_cast<int>(std::ceil(low - .5)));
+    const int last = std::min(width_ - 1, static_cast<int>(std::floor(high - .5)));
+    const double depth_start = depths.dot(at_left) + behind_m;
+    const double depth_step = depths.dot(coordinates.dx);
     for (int x = first; x <= last; ++x) {
       const auto depth = static_cast<float>(depth_start + (x + .5) * depth_step);
       const std::size_t pixel = static_cast<std::size_t>(row) * width_ + x;

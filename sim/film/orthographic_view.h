@@ -8,7 +8,7 @@
 
 namespace hilbrush {
 
-/// How a view is turned. Right-handed: what is written on a surface reads unmirrored.
+/// How a view is turned. Right-handed: writing on a surface is not mirrored.
 struct ViewDirection {
   const char* name;
   Eigen::Vector3d forward_O;  ///< unit, from the eye to the object
@@ -31,8 +31,8 @@ class OrthographicView {
 
   enum class Side : std::uint8_t { kBackground, kFront, kBack };
   struct Pixel {
-    Side side = Side::kBackground;  ///< back: a face seen from behind, which carries no film
-    SurfacePoint point;             ///< what the middle of the pixel shows; of no meaning on the background
+    Side side = Side::kBackground;  ///< back: a face seen from behind, which has no film
+    SurfacePoint point;             ///< what the center of the pixel shows; not valid on the background
   };
   Pixel pixel(int x, int y) const;
   /// Replaces `pixels` by row y, 0 being the top. Cheaper than one by one.

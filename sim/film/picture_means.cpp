@@ -38,12 +38,15 @@ void read_means(const Film& film, const ToneField* tone, const SurfacePoint& cen
   CHECK_LE(sigmas.size(), std::size_t{4});
   std::array<double, 4> weights{};
   std::fill(means.begin(), means.end(), PictureMeans{});
-  const Eigen::Vector3d center_O = position(film.mesh(), center), normal_O = face_normal(film.mesh(), center);
+  const Eigen::Vector3d center_O = position(film.mesh(), center);
+  const Eigen::Vector3d normal_O = face_normal(film.mesh(), center);
   film.points_near(center, kCutSigmas * *std::max_element(sigmas.begin(), sigmas.end()) * film.pitch_m(), points);
   for (const FilmPoint& point : points) {
     const Eigen::Vector3d offset = (point.position_O - center_O) / film.pitch_m();
-    const double depth = offset.dot(normal_O), r2 = offset.squaredNorm() - depth * depth;
-    const double wanted = tone ? tone->wanted(point.point) : 0, painted = film.painted(point.dose_j_m2);
+    const double depth = offset.dot(normal_O);
+    const double r2 = offset.squaredNorm() - depth * depth;
+    const double wanted = tone ? tone->wanted(point.point) : 0;
+    const double painted = film.painted(point.dose_j_m2);
     for (std::size_t k = 0; k < sigmas.size(); ++k) {
       const double reach = kCutSigmas * sigmas[k];
       if (r2 > reach * reach || std::abs(depth) > reach) continue;

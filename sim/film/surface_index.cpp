@@ -62,7 +62,8 @@ std::optional<SurfaceIndex::RayHit> SurfaceIndex::cast(const Eigen::Vector3d& or
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query{};
-  const Eigen::Vector3f origin = origin_O.cast<float>(), direction = direction_O.cast<float>();
+  const Eigen::Vector3f origin = origin_O.cast<float>();
+  const Eigen::Vector3f direction = direction_O.cast<float>();
   query.ray.org_x = origin.x(), query.ray.org_y = origin.y(), query.ray.org_z = origin.z();
   query.ray.dir_x = direction.x(), query.ray.dir_y = direction.y(), query.ray.dir_z = direction.z();
   query.ray.tfar = std::numeric_limits<float>::infinity();
@@ -73,13 +74,17 @@ std::optional<SurfaceIndex::RayHit> SurfaceIndex::cast(const Eigen::Vector3d& or
 
   const TexturedMesh& mesh = implementation_->mesh;
   const std::uint32_t t = query.hit.primID;
-  const Eigen::Vector3d e1 = mesh.corner(t, 1) - mesh.corner(t, 0), e2 = mesh.corner(t, 2) - mesh.corner(t, 0);
+  const Eigen::Vector3d e1 = mesh.corner(t, 1) - mesh.corner(t, 0);
+  const Eigen::Vector3d e2 = mesh.corner(t, 2) - mesh.corner(t, 0);
   // Moeller and Trumbore 1997, in double. A ray within the triangle's plane keeps Embree's answer.
-  const Eigen::Vector3d p = direction_O.cross(e2), s = origin_O - mesh.corner(t, 0), q = s.cross(e1);
+  const Eigen::Vector3d p = direction_O.cross(e2);
+  const Eigen::Vector3d s = origin_O - mesh.corner(t, 0);
+  const Eigen::Vector3d q = s.cross(e1);
   const double determinant = p.dot(e1);
   RayHit hit{{t, {1. - query.hit.u - query.hit.v, query.hit.u, query.hit.v}}, query.ray.tfar};
   if (determinant != 0) {
-    const double u = p.dot(s) / determinant, v = q.dot(direction_O) / determinant;
+    const double u = p.dot(s) / determinant;
+    const double v = q.dot(direction_O) / determinant;
     hit = {{t, {1 - u - v, u, v}}, q.dot(e2) / determinant};
   }
   return hit;

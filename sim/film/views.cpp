@@ -29,14 +29,15 @@ struct ViewPicture {
   std::vector<Eigen::Vector2i> skipped;
 };
 
-/// Means over squares of factor * factor pixels; what the weights weigh is weighed.
+/// Means over squares of factor * factor pixels, weighted by the weights.
 MaskedImage reduced(const MaskedImage& image, int factor) {
   if (factor == 1) return image;
   MaskedImage out((image.width + factor - 1) / factor, (image.height + factor - 1) / factor, kChannelCount);
   const float share = 1.f / static_cast<float>(factor * factor);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
-      const std::size_t from = image.index(x, y), to = out.index(x / factor, y / factor);
+      const std::size_t from = image.index(x, y);
+      const std::size_t to = out.index(x / factor, y / factor);
       out.weights[to] += share * image.weights[from];
       for (int k = kWanted; k <= kError; ++k)
         out.channels[k][to] += share * image.weights[from] * image.channels[k][from];
@@ -67,8 +68,8 @@ void fill_row(const Film& film, const ToneField& tone, const OrthographicView& v
   }
 }
 
-/// `oversampling` pixels of the view go into each of the picture's, each way, so that dots finer than a pixel are
-/// averaged rather than picked.
+/// Each pixel of the picture is the mean of `oversampling` pixels of the view in each direction, so that dots finer
+/// than a pixel are averaged.
 ViewPicture render(const Film& film, const ToneField& tone, std::span<const Eigen::Vector3d> skipped_O,
                    const ViewDirection& direction, double pixel_m, int oversampling) {
   const OrthographicView view(film.mesh(), direction, pixel_m / oversampling, 2 * oversampling);
@@ -110,7 +111,8 @@ void draw_panel(Canvas& canvas, int left, int top, const ViewPicture& view, int 
   for (int y = 0; y < view.image.height; ++y)
     for (int x = 0; x < view.image.width; ++x) {
       const std::size_t i = view.image.index(x, y);
-      const float film_share = view.image.weights[i], back_share = view.image.channels[kBack][i];
+      const float film_share = view.image.weights[i];
+      const float back_share = view.image.channels[kBack][i];
       if (film_share + back_share <= 0) continue;
       const float value = view.image.channels[channel][i];
       const Color film_color = channel == kError ? error_color(value) : tone_color(value, paint);
@@ -143,7 +145,8 @@ Canvas triptych(const ViewPicture& view, const CellDescription::Paint& paint) {
 Canvas contact_sheet(const std::vector<ViewPicture>& views, const CellDescription::Paint& paint,
                      std::size_t skipped_count) {
   constexpr int kScale = 2, kText = 7 * kScale;
-  int width = kPad, height = 0;
+  int width = kPad;
+  int height = 0;
   for (const ViewPicture& view : views) {
     width += std::max(view.image.width, Canvas::text_width(caption(view, kPainted), kScale)) + kPad;
     height = std::max(height, view.image.height);
@@ -168,18 +171,20 @@ Canvas contact_sheet(const std::vector<ViewPicture>& views, const CellDescriptio
   return canvas;
 }
 
-/// Three pixels a pitch, but the longest side is not more than kViewPixels, nor so small that nothing can be seen.
+/// Three pixels a pitch, but the longest side has at most kViewPixels and at least kMinViewPixels.
 double picture_pixel_m(const Film& film) {
-  constexpr int kViewPixelsMin = 240;
+  constexpr int kMinViewPixels = 240;
   const auto [low, high] = bounds(film.mesh());
   const double longest_m = (high - low).maxCoeff();
-  return std::min(std::max(film.pitch_m() / 3, longest_m / kViewPixels), longest_m / kViewPixelsMin);
+  return std::min(std::max(film.pitch_m() / 3, longest_m / kViewPixels), longest_m / kMinViewPixels);
 }
 
 }  // namespace
 
 std::array<ViewDirection, 6> picture_views() {
-  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   return {{{"front", y, z}, {"right", -x, z}, {"back", -y, z}, {"left", x, z}, {"top", -z, y}, {"bottom", z, -y}}};
 }
 
@@ -189,11 +194,11 @@ std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneFi
   const std::filesystem::path views_folder = folder / "views";
   std::error_code error;
   std::filesystem::create_directories(views_folder, error);
-  if (error) throw InputError(views_folder.string(), "the folder cannot be made: " + error.message());
+  if (error) throw InputError(views_folder.string(), "the folder cannot be created: " + error.message());
 
   const double pixel_m = picture_pixel_m(film);
-  constexpr double kPixelsAPitch = 1.5;
-  const int oversampling = std::clamp(static_cast<int>(std::ceil(kPixelsAPitch * pixel_m / film.pitch_m())), 1, 4);
+  constexpr double kPixelsPerPitch = 1.5;
+  const int oversampling = std::clamp(static_cast<int>(std::ceil(kPixelsPerPitch * pixel_m / film.pitch_m())), 1, 4);
   const CellDescription::Paint& paint = film.cell().paint;
   std::vector<std::filesystem::path> files;
   std::vector<ViewPicture> small_views;

@@ -22,7 +22,7 @@ std::array<ViewDirection, 6> picture_views();
 /// where they are seen. Coverage is shown as the reflectance of the paint, relative to unpainted; the error as the
 /// Gaussian mean over a pitch of painted - wanted, orange where too dark, blue where too light, in full color at .2.
 /// Faces seen from behind, which carry no film, are brown. Returns the files written. @throws InputError naming a file
-/// that can't be written.
+/// that cannot be written.
 std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneField& tone,
                                                   std::span<const Eigen::Vector3d> skipped_O,
                                                   const std::filesystem::path& folder, const Progress& progress = {});

@@ -24,7 +24,8 @@ struct EvenPicture {
     const int n = static_cast<int>(2 * kSide / kPitch);
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) {
-        const double u = (i + .5) / n, v = (j + .5) / n;
+        const double u = (i + .5) / n;
+        const double v = (j + .5) / n;
         points.push_back(u >= v ? SurfacePoint{0, {1 - u, u - v, v}} : SurfacePoint{1, {1 - v, u, v - u}});
       }
     film.expose_at(points, std::vector<float>(points.size(), static_cast<float>(painted / 4)));
@@ -70,7 +71,9 @@ TEST(Fidelity, AConstantErrorHasTheFiguresOfItsClosedForm) {
   EXPECT_NEAR(figures.tone_rms, .1, .001);
   EXPECT_NEAR(figures.tone_max, .1, .001);
   EXPECT_NEAR(figures.p999, .1, .002);
-  const double a = .4, b = .5, c1 = 1e-4;
+  const double a = .4;
+  const double b = .5;
+  const double c1 = 1e-4;
   EXPECT_NEAR(figures.s2, (2 * a * b + c1) / (a * a + b * b + c1), .002);
 }
 

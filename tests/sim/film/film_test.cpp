@@ -30,7 +30,9 @@ Joints joints_for(const CellDescription& cell, const Eigen::Vector3d& p_O, doubl
   const Eigen::Vector3d flange =
       focus_W - cell.arm.flange_to_focus_m *
                     Eigen::Vector3d(std::cos(e) * std::cos(yaw), std::cos(e) * std::sin(yaw), -std::sin(e));
-  const double l1 = cell.arm.upper_arm_m, l2 = cell.arm.forearm_m, r = flange.head<2>().norm();
+  const double l1 = cell.arm.upper_arm_m;
+  const double l2 = cell.arm.forearm_m;
+  const double r = flange.head<2>().norm();
   const double elbow = std::acos((r * r - l1 * l1 - l2 * l2) / (2 * l1 * l2));
   const double j1 = std::atan2(flange.y(), flange.x()) - std::atan2(l2 * std::sin(elbow), l1 + l2 * std::cos(elbow));
   return {j1, elbow, flange.z(), yaw - j1 - elbow, tilt, rotation};
@@ -174,7 +176,8 @@ TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimeters) {
   CellDescription cell = handmade_cell();
   cell.arm.beam_depression = 90 * kDegree;
   TexturedMesh mesh = square(.01, 0);  // triangles 0 and 1: the lit face
-  const double r = .005, below = -.002;
+  const double r = .005;
+  const double below = -.002;
   test::add_quad(
       mesh, {Eigen::Vector3d{-r, r, below}, {r, r, below}, {r, -r, below}, {-r, -r, below}});  // the wall's other face
   test::add_quad(mesh, {Eigen::Vector3d{-r, -r, below},
@@ -198,7 +201,8 @@ TEST(Film, AnObstacleTakesTheLightAndIsReportedAsShadow) {
   CellDescription cell = handmade_cell();
   cell.arm.beam_depression = 90 * kDegree;
   TexturedMesh mesh = square(.01, 0);
-  const double r = .002, above = .01;
+  const double r = .002;
+  const double above = .01;
   test::add_quad(mesh, {Eigen::Vector3d{-r, -r, above}, {r, -r, above}, {r, r, above}, {-r, r, above}});
   Film film(mesh, cell, kCellPitch);
   const Emission emission = emission_at(cell, Eigen::Vector3d::Zero(), 0);
@@ -246,7 +250,8 @@ TEST(Film, NeedlesAndSliversCarryTheSameDoseAsAPlainSquare) {
   const double r = .005;
   const int n = 200;
   for (int i = 0; i < n; ++i) {
-    const double a = -r + 2 * r * i / n, b = -r + 2 * r * (i + 1) / n;
+    const double a = -r + 2 * r * i / n;
+    const double b = -r + 2 * r * (i + 1) / n;
     for (const auto& [p, q] : {std::pair{Eigen::Vector3d(r, a, 0), Eigen::Vector3d(r, b, 0)},
                                std::pair{Eigen::Vector3d(-a, r, 0), Eigen::Vector3d(-b, r, 0)}}) {
       const auto first = static_cast<std::uint32_t>(needles.vertices.size());

@@ -21,15 +21,17 @@ TexturedMesh cube() {
   TexturedMesh mesh;
   for (int axis = 0; axis < 3; ++axis)
     for (const double sign : {-1., 1.}) {
-      const Vector3d n = sign * Vector3d::Unit(axis), u = Vector3d::Unit((axis + 1) % 3), v = n.cross(u),
-                     middle = n + Vector3d::UnitZ();
+      const Vector3d n = sign * Vector3d::Unit(axis);
+      const Vector3d u = Vector3d::Unit((axis + 1) % 3);
+      const Vector3d v = n.cross(u);
+      const Vector3d middle = n + Vector3d::UnitZ();
       test::add_quad(mesh, {middle - u - v, middle + u - v, middle + u + v, middle - u + v}, 1);
     }
   return mesh;
 }
 
-/// Where each view shall show its top left corner, and the corner to the right of it: written down from what the header
-/// promises.
+/// Where each view is expected to show its top left corner, and the corner to the right of it: written down from what
+/// the header promises.
 const std::map<std::string, std::pair<Vector3d, Vector3d>> kTopCorners{
     {"front", {{-1, -1, 2}, {1, -1, 2}}}, {"right", {{1, -1, 2}, {1, 1, 2}}}, {"back", {{1, 1, 2}, {-1, 1, 2}}},
     {"left", {{-1, 1, 2}, {-1, -1, 2}}},  {"top", {{-1, 1, 2}, {1, 1, 2}}},   {"bottom", {{-1, -1, 0}, {1, -1, 0}}}};
@@ -40,8 +42,8 @@ TEST(OrthographicView, EveryPictureIsUprightAndUnmirrored) {
     const OrthographicView view(mesh, direction, .02);
     const auto& [top_left, top_right] = kTopCorners.at(direction.name);
     const Vector3d middle(0, 0, 1);
-    const auto left = view.pixel_of(middle + .98 * (top_left - middle), .1),
-               right = view.pixel_of(middle + .98 * (top_right - middle), .1);
+    const auto left = view.pixel_of(middle + .98 * (top_left - middle), .1);
+    const auto right = view.pixel_of(middle + .98 * (top_right - middle), .1);
     ASSERT_TRUE(left && right) << direction.name;
     EXPECT_LT(left->x(), 5) << direction.name;
     EXPECT_LT(left->y(), 5) << direction.name;
@@ -94,7 +96,8 @@ TEST_F(Pictures, ShowWantedPaintedAndErrorWhereTheyAre) {
   const double r = .02;
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) {
-      const double x = (i - 1) * r, z = j * r;
+      const double x = (i - 1) * r;
+      const double z = j * r;
       test::add_quad(mesh, {Vector3d{x, 0, z}, {x + r, 0, z}, {x + r, 0, z + r}, {x, 0, z + r}},
                      i == 0 && j == 1 ? 0.f : 1.f);
     }
@@ -110,13 +113,16 @@ TEST_F(Pictures, ShowWantedPaintedAndErrorWhereTheyAre) {
   const auto front = load_image_file(files[0], 10'000'000);
   ASSERT_TRUE(front) << front.reason();
   // Black in the left panel (wanted) only: nothing is painted. Row 0 of a Texture is the bottom.
-  double x_mean = 0, y_mean = 0;
-  int black = 0, black_elsewhere = 0;
+  double x_mean = 0;
+  double y_mean = 0;
+  int black = 0;
+  int black_elsewhere = 0;
   for (int y = 0; y < front->height; ++y)
     for (int x = 0; x < front->width; ++x) {
       if (front->luminance[static_cast<std::size_t>(y) * front->width + x] > .002) continue;
       (x < front->width / 3 ? black : black_elsewhere) += 1;
-      x_mean += x, y_mean += y;
+      x_mean += x;
+      y_mean += y;
     }
   EXPECT_GT(black, 1000);
   EXPECT_EQ(black_elsewhere, 0);
