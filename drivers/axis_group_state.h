@@ -39,7 +39,8 @@ class AxisGroupState {
   std::string fault;                               ///< a sentence, if state is kFault
   bool is_target_current = false;                  ///< false after a stop and a fault: the axes are not bound for it
   bool is_in_position = false;
-  double settle_s = 0, arrival_s = 0;  ///< asked for with the target; expected, on the cell's clock
+  double settle_s = 0;   ///< asked for with the target
+  double arrival_s = 0;  ///< expected, on the cell's clock
   double in_position_since_s = 0;
 
   const std::string& name() const { return name_; }

@@ -22,17 +22,21 @@ struct AxisScale {
 
 /// What an axis may do: orders beyond it are refused.
 struct AxisBounds {
-  double min = 0, max = 0;      ///< rad or m
+  double min = 0;               ///< rad or m
+  double max = 0;               ///< rad or m
   double speed_max = 0;         ///< rad/s or m/s
   double acceleration_max = 0;  ///< rad/s2 or m/s2
 };
 
 struct DobotOptions {
   std::string host;
-  std::uint16_t dashboard_port = 29999, motion_port = 30003, feedback_port = 30004;
+  std::uint16_t dashboard_port = 29999;
+  std::uint16_t motion_port = 30003;
+  std::uint16_t feedback_port = 30004;
   int speed_percent = 100;  ///< of the controller's own limits
   /// In position: every joint within this of its target.
-  double window_rad = 5.2e-5, window_m = 5e-6;
+  double window_rad = 5.2e-5;
+  double window_m = 5e-6;
   std::array<AxisScale, 4> scales;
   std::array<AxisBounds, 4> bounds;
 };
@@ -64,7 +68,8 @@ struct RegisterStep {
   Kind kind = Kind::kWrite;
   std::size_t reg = 0;  ///< index in RegisterMap::registers
   Source source = Source::kConstant;
-  std::uint32_t value = 0, mask = 0xFFFFFFFF;
+  std::uint32_t value = 0;
+  std::uint32_t mask = 0xFFFFFFFF;
   double timeout_s = 0.5;  ///< of a wait; length of a pause
 };
 
@@ -84,7 +89,8 @@ struct MappedRegister {
 /// Holds if the masked bits of a register equal a value.
 struct RegisterTest {
   std::size_t reg = 0;
-  std::uint32_t mask = 0, equals = 0;
+  std::uint32_t mask = 0;
+  std::uint32_t equals = 0;
 };
 
 /// How a positioning drive is driven over Modbus, as data: see config/axes/*.json.
@@ -106,8 +112,9 @@ struct RegisterMap {
 struct LaserOptions {
   std::string port;  ///< serial device, or tcp://HOST:PORT
   int baud = 115200;
-  double power_min_w = 0, power_max_w = 0;  ///< the cell file's, checked against the device's own
-  double arm_timeout_s = 30;                ///< start delay and warm-up
+  double power_min_w = 0;     ///< the cell file's, checked against the device's own
+  double power_max_w = 0;     ///< the cell file's, checked against the device's own
+  double arm_timeout_s = 30;  ///< start delay and warm-up
   /// Wall, between two commands that are answered; Cobolt lasers: what the maker's own library keeps.
   double command_gap_s = 0.1;
   double heartbeat_s = 0.02;  ///< to its guard

@@ -19,7 +19,10 @@ class Laser {
     double dark_since_s = 0;
   };
   struct Limits {
-    double power_min_w = 0, power_max_w = 0, pulse_min_s = 0, pulse_max_s = 0;
+    double power_min_w = 0;
+    double power_max_w = 0;
+    double pulse_min_s = 0;
+    double pulse_max_s = 0;
   };
 
   virtual ~Laser() = default;

@@ -19,7 +19,8 @@ class LaserHead {
     double read_s = 0;  ///< when the reading it comes from was begun, on the cell's clock
   };
   struct Powers {
-    double min_w = 0, max_w = 0;
+    double min_w = 0;
+    double max_w = 0;
   };
 
   virtual ~LaserHead() = default;

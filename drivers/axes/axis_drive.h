@@ -21,7 +21,8 @@ class AxisDrive {
   struct Reading {
     double position = 0;             ///< measured, steps
     std::optional<double> setpoint;  ///< what the profile asks for now, steps
-    bool is_enabled = false, is_homed = false;
+    bool is_enabled = false;
+    bool is_homed = false;
     bool has_arrived = false;  ///< as the drive reports it
     bool has_fault = false;
     std::uint32_t alarm = 0;

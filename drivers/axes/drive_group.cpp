@@ -193,7 +193,8 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
   const std::unique_lock command(command_mutex_, deadline_in(1));
   if (!command) throw DriverError("the " + group_.name() + " is busy");
   std::array<AxisDrive::Move, N> moves;
-  std::array<bool, N> is_new{}, is_ahead{};
+  std::array<bool, N> is_new{};
+  std::array<bool, N> is_ahead{};
   {
     const std::lock_guard lock(mutex_);
     if (group_.state != DeviceState::kReady) group_.refuse("moved");

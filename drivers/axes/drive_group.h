@@ -83,7 +83,8 @@ class DriveGroup final : public AxisGroup<N> {
 
   std::mutex mutex_;  ///< of what follows; never held while waiting for a drive
   std::condition_variable poll_asked_;
-  bool is_polling_ = false, is_poll_due_ = false;
+  bool is_polling_ = false;
+  bool is_poll_due_ = false;
   AxisGroupState<N> group_;
   Positions positions_{};
   bool is_accepted_ = false;

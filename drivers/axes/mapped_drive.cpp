@@ -14,7 +14,8 @@ namespace hilbrush {
 namespace register_map {
 
 std::vector<std::uint16_t> encode(const MappedRegister& reg, std::uint32_t value) {
-  const auto low = static_cast<std::uint16_t>(value & 0xFFFF), high = static_cast<std::uint16_t>(value >> 16);
+  const auto low = static_cast<std::uint16_t>(value & 0xFFFF);
+  const auto high = static_cast<std::uint16_t>(value >> 16);
   if (reg.words == 1) return {low};
   return reg.is_high_word_first ? std::vector{high, low} : std::vector{low, high};
 }

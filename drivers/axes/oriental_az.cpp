@@ -22,7 +22,9 @@ std::int32_t signed_at(std::span<const std::uint16_t, 4> words, std::size_t inde
 }  // namespace
 
 DirectData encode_move(const AxisDrive::Move& move, Trigger trigger) {
-  constexpr std::uint32_t kOperationData = 0, kAbsolute = 1, kFullCurrent = 1000;
+  constexpr std::uint32_t kOperationData = 0;
+  constexpr std::uint32_t kAbsolute = 1;
+  constexpr std::uint32_t kFullCurrent = 1000;
   DirectData data{};
   put(data, 0, kOperationData);
   put(data, 1, kAbsolute);

@@ -103,13 +103,17 @@ std::optional<Reply> decode_reply(std::string_view text) {
 }
 
 bool is_echo(std::string_view echo, std::string_view command) {
-  const auto a = parse_call(echo), b = parse_call(command);
+  const auto a = parse_call(echo);
+  const auto b = parse_call(command);
   if (!a || !b || a->commas != b->commas || a->has_parameters != b->has_parameters) return false;
   return line_codec::equals_ignoring_case(a->name, b->name);
 }
 
 std::string error_text(long error) {
-  constexpr long kNoSuchCommand = -10000, kParameterCount = -20000, kParameterType = -30000, kParameterRange = -40000;
+  constexpr long kNoSuchCommand = -10000;
+  constexpr long kParameterCount = -20000;
+  constexpr long kParameterType = -30000;
+  constexpr long kParameterRange = -40000;
   const auto is_of = [error](long base) { return error < base && error > base - 100; };
   if (error == -1) return "is refused";
   if (error == kNoSuchCommand) return "is unknown to the controller";

@@ -61,7 +61,9 @@ struct Frame {
   Joints setpoint{};          ///< what the controller asks of its axes now
   Joints actual{};            ///< deg, mm
   Joints speed{};             ///< deg/s, mm/s
-  bool is_enabled = false, is_running = false, has_error = false;
+  bool is_enabled = false;
+  bool is_running = false;
+  bool has_error = false;
 };
 inline constexpr std::size_t kFrameBytes = 1440;
 

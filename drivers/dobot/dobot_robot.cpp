@@ -297,7 +297,8 @@ bool DobotRobot::judge_arrival(const dobot::Frame& frame) {
 
 /// Reader's thread.
 void DobotRobot::take_frame(const dobot::Frame& frame) {
-  bool is_news = false, has_failed = false;
+  bool is_news = false;
+  bool has_failed = false;
   {
     const std::lock_guard lock(mutex_);
     if (frame_count_ > 0 && frame.time_ms == frame_.time_ms) return;  // stale

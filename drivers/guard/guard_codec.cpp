@@ -91,7 +91,9 @@ std::string encode(const StatusMessage& message) {
 std::optional<StatusMessage> decode_status(std::string_view message) {
   if (message.size() > kMessageMax || take_word(message) != "status") return std::nullopt;
   StatusMessage result;
-  int state = 0, is_closed = 0, is_gate_on = 0;
+  int state = 0;
+  int is_closed = 0;
+  int is_gate_on = 0;
   if (!read(take_word(message), state) || !read(take_word(message), is_closed) ||
       !read(take_word(message), is_gate_on) || !read(take_word(message), result.read_ns) ||
       !read(take_word(message), result.requested_readings))

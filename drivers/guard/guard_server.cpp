@@ -97,7 +97,8 @@ void GuardServer::trip(const std::string& sentence) {
 
 GuardServer::End GuardServer::run() {
   const double allowance_s = options_.heartbeat_s * options_.heartbeats_missed;
-  Deadline beat_deadline = Steady::now(), status_deadline = Steady::now();
+  Deadline beat_deadline = Steady::now();
+  Deadline status_deadline = Steady::now();
   std::optional<End> end;
   while (!end) {
     std::array<pollfd, 2> polled{pollfd{channel_, POLLIN, 0}, pollfd{signals_, POLLIN, 0}};

@@ -134,7 +134,8 @@ void GuardedHead::run() {
   const sched_param parameters{kPriority};
   ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters);
   try {
-    Deadline beat = Steady::now(), silence = deadline_in(options_.silence_s);
+    Deadline beat = Steady::now();
+    Deadline silence = deadline_in(options_.silence_s);
     for (;;) {
       {
         const std::lock_guard lock(mutex_);
@@ -177,7 +178,8 @@ bool GuardedHead::read_messages() {
 }
 
 void GuardedHead::take(const guard::StatusMessage& message) {
-  bool is_news = false, is_dark = false;
+  bool is_news = false;
+  bool is_dark = false;
   {
     const std::lock_guard lock(mutex_);
     const auto age = Steady::now().time_since_epoch() - std::chrono::nanoseconds(message.read_ns);

@@ -10,7 +10,8 @@ std::string encode(std::string_view command);  ///< with its line end
 /// "LASer:PM:POWer:SETPoint 12.300": power while modulated, milliwatts.
 std::string power_command(double power_w);
 
-inline constexpr std::string_view kOpen = "!e\r", kClose = "!d\r";
+inline constexpr std::string_view kOpen = "!e\r";
+inline constexpr std::string_view kClose = "!d\r";
 
 /// Whether the answer to a command that asks nothing means that it was obeyed.
 bool is_ok(std::string_view line);

@@ -65,7 +65,9 @@ class CoboltGate final : public Gate {
   std::mutex mutex_;
   std::condition_variable ordered_;
   Listener listener_;
-  bool is_ending_ = false, is_open_ = false, has_failed_ = false;
+  bool is_ending_ = false;
+  bool is_open_ = false;
+  bool has_failed_ = false;
   bool is_known_off_ = false;
   Deadline end_{};
   std::thread thread_;

@@ -44,7 +44,8 @@ class LineLaser : public LaserHead {
   static constexpr double kUrgentS = 0.1;  ///< wall
 
   struct Condition {
-    bool is_interlock_closed = false, is_key_in = false;
+    bool is_interlock_closed = false;
+    bool is_key_in = false;
     bool is_armed = false;  ///< emission can be gated now
     std::string fault;      ///< what else is wrong
   };
@@ -99,7 +100,10 @@ class LineLaser : public LaserHead {
   std::string fault_;
   Condition condition_;
   double read_s_ = 0;
-  bool is_polling_ = false, is_request_due_ = false, is_disarming_ = false, is_arming_ = false;
+  bool is_polling_ = false;
+  bool is_request_due_ = false;
+  bool is_disarming_ = false;
+  bool is_arming_ = false;
   Powers powers_;
   std::optional<double> power_w_;  ///< as last read back
   std::thread thread_;

@@ -24,7 +24,8 @@ class MessageRing {
  private:
   using Steady = std::chrono::steady_clock;
   struct Message {
-    bool is_sent = false, is_cut = false;
+    bool is_sent = false;
+    bool is_cut = false;
     Steady::time_point time;
     std::array<char, kTextMax> bytes{};
     std::size_t size = 0;

@@ -73,7 +73,8 @@ Record encode(const Emission& emission) {
 
 /// False if the checksum does not fit.
 bool decode(std::span<const std::uint8_t> record, Emission& emission) {
-  std::uint32_t crc = 0, is_moving = 0;
+  std::uint32_t crc = 0;
+  std::uint32_t is_moving = 0;
   std::memcpy(&crc, record.data() + kCheckedBytes, sizeof crc);
   if (crc != crc32(record.first(kCheckedBytes))) return false;
   std::array<double, kDoubleCount> numbers;

@@ -70,7 +70,8 @@ class SimAxisGroup final : public AxisGroup<N> {
     group_.check_bounds(target);
 
     on_motion_(now);
-    double end = now, share = 0;
+    double end = now;
+    double share = 0;
     for (std::size_t i = 0; i < N; ++i) {
       const double move = std::abs(target[i] - motions_[i].position(now));
       if (axes_[i].settle_saturation > 0) share = std::max(share, std::min(1., move / axes_[i].settle_saturation));

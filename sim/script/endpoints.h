@@ -7,7 +7,9 @@ namespace hilbrush {
 
 struct WireEndpoints {
   std::string host = "127.0.0.1";
-  std::uint16_t dashboard_port = 0, motion_port = 0, feedback_port = 0;
+  std::uint16_t dashboard_port = 0;
+  std::uint16_t motion_port = 0;
+  std::uint16_t feedback_port = 0;
   int gate_output = 1;
 
   std::string table_driver;          ///< "oriental-az" or "modbus-axes"

@@ -143,7 +143,8 @@ void OrientalBank::set_inputs(std::uint32_t inputs) {
 /// Speed in steps/s, acceleration in 0.001 kHz/s = steps/s2, current in 0.1 %.
 bool OrientalBank::start_direct_data() {
   const auto& [number, type, position, speed, acceleration, deceleration, current, trigger] = direct_;
-  constexpr std::uint32_t kAbsolute = 1, kIncremental = 2;
+  constexpr std::uint32_t kAbsolute = 1;
+  constexpr std::uint32_t kIncremental = 2;
   if (drive_.alarm() != 0 || is_free_ || number > 255 || current > 1000) return false;
   if (type != kAbsolute && type != kIncremental) return false;
   auto target = static_cast<std::int32_t>(position);

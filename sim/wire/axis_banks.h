@@ -76,7 +76,8 @@ class OrientalBank final : public DriveBank {
   bool start_direct_data();
   std::uint16_t outputs();
 
-  static constexpr std::uint16_t kDirectData = 0x0058, kDirectDataEnd = 0x0068;
+  static constexpr std::uint16_t kDirectData = 0x0058;
+  static constexpr std::uint16_t kDirectDataEnd = 0x0068;
   std::array<std::uint32_t, 8> direct_{};  ///< number, type, position, speed, accel, decel, current, trigger
   std::uint32_t levels_ = 0;
   bool is_free_ = false;
@@ -97,10 +98,14 @@ class Cia402Bank final : public DriveBank {
 
   State state_ = State::kSwitchOnDisabled;
   std::uint16_t control_ = 0;
-  bool is_set_point_acknowledged_ = false, is_homed_ = true, is_homing_ = false;
+  bool is_set_point_acknowledged_ = false;
+  bool is_homed_ = true;
+  bool is_homing_ = false;
   std::int8_t mode_ = 1;
   std::int32_t target_ = 0;
-  std::uint32_t speed_ = 0, acceleration_ = 0, deceleration_ = 0;
+  std::uint32_t speed_ = 0;
+  std::uint32_t acceleration_ = 0;
+  std::uint32_t deceleration_ = 0;
 };
 
 /// Of the motor, as the drive is set.
@@ -118,7 +123,8 @@ class LeadshineBank final : public DriveBank {
   bool trigger(std::uint16_t code);
 
   std::array<std::uint16_t, 8> path_{};  ///< 0x6200: mode, position (2), speed, acceleration, deceleration, ...
-  bool is_homed_ = true, has_command_done_ = true;
+  bool is_homed_ = true;
+  bool has_command_done_ = true;
 };
 
 }  // namespace hilbrush

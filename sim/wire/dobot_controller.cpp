@@ -49,7 +49,10 @@ std::array<double, 4> pose_of(const CellDescription::Arm& arm, const std::array<
 /// The joints of a pose, the elbow on the side of `near`; nothing if it is out of reach.
 std::optional<std::array<double, 4>> joints_of(const CellDescription::Arm& arm, const std::array<double, 4>& pose,
                                                double near_j2) {
-  const double x = pose[0] * 1e-3, y = pose[1] * 1e-3, a = arm.upper_arm_m, b = arm.forearm_m;
+  const double x = pose[0] * 1e-3;
+  const double y = pose[1] * 1e-3;
+  const double a = arm.upper_arm_m;
+  const double b = arm.forearm_m;
   const double cosine = (x * x + y * y - a * a - b * b) / (2 * a * b);
   if (!(std::abs(cosine) <= 1)) return std::nullopt;
   const double j2 = std::copysign(std::acos(cosine), near_j2 == 0 ? 1 : near_j2);
@@ -164,7 +167,8 @@ std::string DobotController::joint_move(const Arguments& arguments, bool is_pose
 }
 
 std::string DobotController::output_command(const Arguments& arguments, bool is_queued) {
-  int index = 0, level = 0;
+  int index = 0;
+  int level = 0;
   if (arguments.size() != 2) return answered(kWrongCount);
   if (!read_integer(arguments[0], index)) return answered(kWrongType - 1);
   if (!read_integer(arguments[1], level)) return answered(kWrongType - 2);
@@ -325,7 +329,8 @@ std::string DobotController::frame() {
   put_axes(frame, 432, last_.positions);
   put_axes(frame, 480, last_.speeds);
   const auto& arm = cell_.description().arm;
-  const auto actual = pose_of(arm, last_.positions), wanted = pose_of(arm, last_.targets);
+  const auto actual = pose_of(arm, last_.positions);
+  const auto wanted = pose_of(arm, last_.targets);
   for (std::size_t i = 0; i < 4; ++i) {
     put(frame, 624 + 8 * i, actual[i]);
     put(frame, 768 + 8 * i, wanted[i]);

@@ -73,7 +73,9 @@ class DobotController {
 
   struct State {
     int mode = 4;
-    std::array<double, 4> positions{}, speeds{}, targets{};
+    std::array<double, 4> positions{};
+    std::array<double, 4> speeds{};
+    std::array<double, 4> targets{};
   };
   State present() const;
   std::string joint_move(const Arguments& arguments, bool is_pose);
@@ -91,15 +93,20 @@ class DobotController {
   FaultInjector& faults_;
   TimeRecord& times_;
   const DobotControllerOptions options_;
-  bool is_enabled_ = false, is_paused_ = false, is_jogging_ = false;
+  bool is_enabled_ = false;
+  bool is_paused_ = false;
+  bool is_jogging_ = false;
   double enabled_s_ = 0;
   int alarm_ = 0;
-  double speed_factor_ = 1, joint_speed_ = 1, joint_acceleration_ = 1;
+  double speed_factor_ = 1;
+  double joint_speed_ = 1;
+  double joint_acceleration_ = 1;
   std::uint64_t outputs_ = 0;
   std::deque<Item> queue_;
   std::optional<Item> current_;
   double current_end_s_ = 0;  ///< of a wait
-  std::uint64_t accepted_ = 0, dropped_ = 0;
+  std::uint64_t accepted_ = 0;
+  std::uint64_t dropped_ = 0;
   std::optional<State> stale_;
   State last_;
 };

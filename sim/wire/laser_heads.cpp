@@ -50,7 +50,8 @@ std::string ObisLaser::answer_line(const std::string& line) {
 }
 
 ObisLaser::Reply ObisLaser::obey(const std::string& header, const std::string& parameter) {
-  const bool is_on = parameter == "on", is_switch = is_on || parameter == "off";
+  const bool is_on = parameter == "on";
+  const bool is_switch = is_on || parameter == "off";
   const auto set = [&](bool& flag) -> Reply {
     if (!is_switch) return {true, false, ""};
     flag = is_on;
@@ -204,7 +205,8 @@ bool CoboltLaser::obey(const std::string& line) {
   }
   const std::size_t blank = line.find(' ');
   if (blank == std::string::npos) return false;
-  const std::string name = line.substr(0, blank), parameter = line.substr(blank + 1);
+  const std::string name = line.substr(0, blank);
+  const std::string parameter = line.substr(blank + 1);
   if (name == "p") return set_power(parameter, 1);
   if (name == "!p" || name == "laser:cp:power:setpoint" || name == "laser:pm:power:setpoint")
     return set_power(parameter, 1e-3);

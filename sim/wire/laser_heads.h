@@ -32,7 +32,8 @@ class ObisLaser final : public SerialLaser {
 
  private:
   struct Reply {
-    bool is_known = true, is_done = true;
+    bool is_known = true;
+    bool is_done = true;
     std::string value;
   };
   Reply obey(const std::string& header, const std::string& parameter);
@@ -40,7 +41,9 @@ class ObisLaser final : public SerialLaser {
   unsigned status() const;
   unsigned faults_word() const;
 
-  bool has_handshake_ = true, has_start_delay_ = true, has_autostart_ = false;
+  bool has_handshake_ = true;
+  bool has_start_delay_ = true;
+  bool has_autostart_ = false;
   bool is_digital_ = false;
   int error_count_ = 0;
 };
@@ -59,7 +62,9 @@ class CoboltLaser final : public SerialLaser {
   bool set_power(const std::string& text, double unit_w);
   int operating_mode() const;
 
-  bool is_modulated_ = false, is_commanded_ = false, is_paused_ = false;
+  bool is_modulated_ = false;
+  bool is_commanded_ = false;
+  bool is_paused_ = false;
 };
 
 }  // namespace hilbrush

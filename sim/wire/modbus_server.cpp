@@ -5,7 +5,8 @@
 namespace hilbrush {
 namespace {
 
-constexpr std::size_t kReadMax = 125, kWriteMax = 123;
+constexpr std::size_t kReadMax = 125;
+constexpr std::size_t kWriteMax = 123;
 constexpr std::size_t kMbapBytes = 7;
 
 std::uint8_t byte_at(std::string_view bytes, std::size_t i) {

@@ -13,7 +13,8 @@ class TimeRecord {
  public:
   /// One dot: before its light, and from its end to the next motion.
   struct Dot {
-    double light_on_s = 0, light_off_s = 0;
+    double light_on_s = 0;
+    double light_off_s = 0;
     double before_s = 0;  ///< from the last device's being seen settled to the light
     double after_s = 0;   ///< from the light's being seen off to the next motion; 0 for the last dot
   };
@@ -29,8 +30,13 @@ class TimeRecord {
 
  private:
   static constexpr std::size_t kDotsMax = 1u << 22;
-  double robot_shown_s_ = 0, table_shown_s_ = 0, dark_shown_s_ = 0;
-  bool is_robot_shown_ = true, is_table_shown_ = true, is_dark_shown_ = true, has_moved_ = true;
+  double robot_shown_s_ = 0;
+  double table_shown_s_ = 0;
+  double dark_shown_s_ = 0;
+  bool is_robot_shown_ = true;
+  bool is_table_shown_ = true;
+  bool is_dark_shown_ = true;
+  bool has_moved_ = true;
   std::vector<Dot> dots_;
 };
 

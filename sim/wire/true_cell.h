@@ -104,9 +104,12 @@ class TrueCell {
   struct Axis {
     AxisMotion motion;
     double target = 0;
-    double rest_s = -1, settled_s = -1;
+    double rest_s = -1;
+    double settled_s = -1;
     double creep = 0;  ///< signed, at rest_s
-    double drift_speed = 0, drift_from_s = 0, drifted = 0;
+    double drift_speed = 0;
+    double drift_from_s = 0;
+    double drifted = 0;
     double off_since_s = kNever;  ///< since when its place is not where it was sent
     bool is_jammed = false;
   };
@@ -122,11 +125,16 @@ class TrueCell {
   double now_s_ = 0;
   std::array<Axis, kAxisCount> axes_;
 
-  bool has_key_ = true, is_interlock_closed_ = true, is_tripped_ = false;
-  bool is_ordered_ = false, is_gate_open_ = false, is_serial_gate_open_ = false;
+  bool has_key_ = true;
+  bool is_interlock_closed_ = true;
+  bool is_tripped_ = false;
+  bool is_ordered_ = false;
+  bool is_gate_open_ = false;
+  bool is_serial_gate_open_ = false;
   double may_emit_s_ = kNever;
   Modulation modulation_ = Modulation::kNone;
-  double power_w_ = 0, power_max_w_ = 0;
+  double power_w_ = 0;
+  double power_max_w_ = 0;
   std::optional<Emission> emission_;
   EmissionSink sink_;
   TimeRecord* times_ = nullptr;

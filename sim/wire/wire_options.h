@@ -13,7 +13,8 @@ struct WireOptions {
   bool is_laser_serial = false;                ///< a pseudo-terminal instead of a TCP port
   double time_scale = 1;                       ///< wall seconds of one cell second, > 0
   double steps_per_deg = 2777.77777777777777;  ///< a motor of 10,000 steps a turn behind a gear of 100
-  double start_delay_s = 5, warm_up_s = 0;
+  double start_delay_s = 5;
+  double warm_up_s = 0;
   double notice_s = .03;  ///< see TrueCellOptions
   FaultScript faults;
 };

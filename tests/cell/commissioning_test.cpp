@@ -97,7 +97,8 @@ class CheckCell : public testing::Test {
   }
 
   TemporaryFolder folder;
-  const std::string cell = (folder / "cell.json").string(), record = (folder / "emissions.ply").string();
+  const std::string cell = (folder / "cell.json").string();
+  const std::string record = (folder / "emissions.ply").string();
 };
 
 TEST_F(CheckCell, AFitCellIsSaidToBeFitAndNothingMovesOrShines) {

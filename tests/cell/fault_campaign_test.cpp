@@ -125,9 +125,14 @@ class WorldOnWires final : public CampaignWorld {
 };
 
 struct Tally {
-  unsigned cases = 0, painted_at_once = 0, painted_later = 0, stops = 0, in_doubt = 0;
+  unsigned cases = 0;
+  unsigned painted_at_once = 0;
+  unsigned painted_later = 0;
+  unsigned stops = 0;
+  unsigned in_doubt = 0;
   std::uint64_t faults = 0;
-  double worst_s = 0, worst_overrun_s = 0;
+  double worst_s = 0;
+  double worst_overrun_s = 0;
 };
 
 /// One job with one or two faults, and now and then an operator's stop, resumed until it is done.

@@ -43,14 +43,16 @@ TEST(FilmOfTheWireTest, TheEggCupIsHitWhereItIsInProcess) {
   program.exposures.resize(kPainted);
   std::erase_if(program.vias, [](const Via& via) { return via.before_exposure >= kPainted; });
   const CellDescription description = test::shipped_cell();
-  const auto in_process = painted_in_process(program, description), on_wire = painted_on_wire(program);
+  const auto in_process = painted_in_process(program, description);
+  const auto on_wire = painted_on_wire(program);
   ASSERT_EQ(on_wire.size(), in_process.size());
 
   PlacementOptions placement;
   placement.size_m = *settings.size_mm * 1e-3;
   const TexturedMesh mesh = place_on_table(load_model(model, load_image_file), placement);
   Film one(mesh, description, program.pitch_m), other(mesh, description, program.pitch_m);
-  const auto hits = one.expose(in_process), others = other.expose(on_wire);
+  const auto hits = one.expose(in_process);
+  const auto others = other.expose(on_wire);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     ASSERT_TRUE(hits[i].is_hit && others[i].is_hit) << "exposure " << i;
     EXPECT_LT((hits[i].position_O - others[i].position_O).norm(), 10e-6) << "exposure " << i;

@@ -76,7 +76,8 @@ TEST_F(KillCampaign, NoDotTwiceNoneLostAtMostOneInDoubtEach) {
     id_ = daemons_.submit(*client, daemons_.model("cup.wrl", dots_), "ready");
   }
   const double kill_after_max_s = is_long() ? 1 : .06;
-  std::size_t last_done = 0, doubts = 0;
+  std::size_t last_done = 0;
+  std::size_t doubts = 0;
   int kills = 0;
   for (; kills < kills_; ++kills) {
     DaemonProcess daemon(daemons_.options);

@@ -52,7 +52,11 @@ class WireSoak {
   }
 
   DaemonWorld& world() { return daemons_; }
-  std::size_t disturbances = 0, lost_connections = 0, restarts = 0, dots = 0, doubts = 0;
+  std::size_t disturbances = 0;
+  std::size_t lost_connections = 0;
+  std::size_t restarts = 0;
+  std::size_t dots = 0;
+  std::size_t doubts = 0;
 
  private:
   void restart() {

@@ -175,7 +175,8 @@ void VirtualRobot::read_state() {
   try {
     link_.exchange([&] {
       const std::string frame = devices_.robot().frame();
-      std::uint64_t mode = 0, outputs = 0;
+      std::uint64_t mode = 0;
+      std::uint64_t outputs = 0;
       std::memcpy(&outputs, frame.data() + 16, sizeof outputs);
       std::memcpy(&mode, frame.data() + 24, sizeof mode);
       mode_ = static_cast<int>(mode);

@@ -91,7 +91,8 @@ class VirtualAxes : public AxisGroup<N>, protected VirtualDevice {
  private:
   Positions target_{};
   bool has_target_ = false;
-  double settle_s_ = 0, rest_since_s_ = -1;
+  double settle_s_ = 0;
+  double rest_since_s_ = -1;
 };
 
 class VirtualRobot final : public VirtualAxes<4> {

@@ -65,7 +65,8 @@ class ModbusPeer {
     const auto word = [&](std::size_t i) { return static_cast<std::uint16_t>(frame[i] << 8 | frame[i + 1]); };
     Registers& registers = units_[frame[6]];
     const int address = word(8);
-    constexpr std::uint8_t kRead = 3, kWriteOne = 6;
+    constexpr std::uint8_t kRead = 3;
+    constexpr std::uint8_t kWriteOne = 6;
     if (frame[7] == kRead) {
       ++reads_since_write_;
       reply.push_back(static_cast<std::uint8_t>(2 * word(10)));

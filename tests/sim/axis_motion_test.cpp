@@ -38,7 +38,8 @@ TEST(AxisMotion, StaysContinuousAndWithinLimitsThroughMovesAndStops) {
   for (unsigned seed = 1; seed <= 50; ++seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0, 1);
-    const double speed_max = .1 + 5 * uniform(random), acceleration = 1 + 50 * uniform(random);
+    const double speed_max = .1 + 5 * uniform(random);
+    const double acceleration = 1 + 50 * uniform(random);
     AxisMotion motion(uniform(random));
     double now = 0;
     for (int i = 0; i < 20; ++i) {
@@ -47,7 +48,8 @@ TEST(AxisMotion, StaysContinuousAndWithinLimitsThroughMovesAndStops) {
                                     : before.move_to(4 * uniform(random) - 2, now, speed_max, acceleration);
       ASSERT_NEAR(before.position(now), motion.position(now), 1e-12) << "seed " << seed;
       ASSERT_NEAR(before.speed(now), motion.speed(now), 1e-9) << "seed " << seed;
-      const double until = now + .7 * uniform(random), step = 1e-3;
+      const double until = now + .7 * uniform(random);
+      const double step = 1e-3;
       for (double t = now; t < until; t += step) {
         ASSERT_LE(std::abs(motion.speed(t)), speed_max * (1 + 1e-9)) << "seed " << seed;
         ASSERT_LE(std::abs(motion.speed(t + step) - motion.speed(t)), acceleration * step * (1 + 1e-6) + 1e-9)

@@ -89,7 +89,8 @@ TEST(SimCell, AMoveTakesTheSlowestAxisAndThenSettles) {
   EXPECT_EQ(robot.status().state, DeviceState::kMoving);
   EXPECT_EQ(refusal([&] { robot.move_to({}, 0); }), "the robot cannot be moved: it is moving");
 
-  const double speed = 4 * std::numbers::pi, acceleration = 8000 * std::numbers::pi / 180;
+  const double speed = 4 * std::numbers::pi;
+  const double acceleration = 8000 * std::numbers::pi / 180;
   const double slowest = 2 * std::sqrt(1 / acceleration);  // J4 turns by 1 rad and never reaches its top speed
   ASSERT_LT(std::sqrt(acceleration), speed);
   const double move = std::ceil(slowest / .004) * .004;

@@ -55,7 +55,8 @@ inline TexturedMesh sphere(double radius, int rings) {
   TexturedMesh mesh;
   const int around = 2 * rings;
   const auto place = [&](int i, int j) {
-    const double polar = std::numbers::pi * i / rings, azimuth = 2 * std::numbers::pi * j / around;
+    const double polar = std::numbers::pi * i / rings;
+    const double azimuth = 2 * std::numbers::pi * j / around;
     return Eigen::Vector3d(radius * std::sin(polar) * std::cos(azimuth), radius * std::sin(polar) * std::sin(azimuth),
                            radius + radius * std::cos(polar));
   };
@@ -87,7 +88,8 @@ void visit_surface(const TexturedMesh& mesh, double step_m, Visit visit) {
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < 2 * (n - i) - 1; ++j) {
         const double third = j % 2 == 0 ? 1. / 3 : 2. / 3;
-        const double u = (i + third) / n, v = (j / 2 + third) / n;
+        const double u = (i + third) / n;
+        const double v = (j / 2 + third) / n;
         visit(SurfacePoint{t, {1 - u - v, u, v}}, area / (static_cast<double>(n) * n));
       }
   }

@@ -25,7 +25,8 @@ TEST(TrueCell, AnAxisTakesTheTimeOfTheTimeModelAndSettles) {
   std::uniform_real_distribution<double> place(-1.2, 1.2);
   for (int round = 0; round < 50; ++round) {
     Bench bench;
-    const double from = description.axes[kJ1].home, to = place(random);
+    const double from = description.axes[kJ1].home;
+    const double to = place(random);
     bench.cell.move_axis(kJ1, to);
     const auto& axis = description.axes[kJ1];
     const double rest_s = trapezoid_s(std::abs(to - from), axis.speed_max, axis.acceleration_max);
