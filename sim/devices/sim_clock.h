@@ -6,7 +6,7 @@
 namespace hilbrush {
 
 /// The simulated cell's time. time_scale wall seconds make one cell second; 0 is virtual time, which stands still until
-/// somebody sleeps and then jumps to the end of the sleep: right for one executor thread, whose sleeps are then all
+/// a thread sleeps and then jumps to the end of the sleep: right for one executor thread, whose sleeps are then all
 /// that takes time.
 class SimClock final : public Clock {
  public:

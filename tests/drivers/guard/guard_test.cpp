@@ -97,7 +97,7 @@ class GuardTest : public testing::Test {
     world->wire.act([&](TrueCell& cell) { is_ordered = cell.is_emission_ordered(); });
     return is_ordered;
   }
-  /// Wall milliseconds until the laser can't emit any more, or 5000.
+  /// Wall milliseconds until the laser cannot emit any more, or 5000.
   double milliseconds_until_off() {
     const auto start_time = Steady::now();
     double passed = 0;
