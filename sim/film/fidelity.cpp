@@ -42,7 +42,7 @@ std::vector<Reading> stratified_points(const TexturedMesh& mesh, std::uint64_t s
   for (std::size_t t = 0; t < area_to.size(); ++t) area_to[t] = area += mesh.area_vector(t).norm();
   std::vector<Reading> readings(area > 0 ? kSampleCount : 0);
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    const double place = (i + uniform(seed, 3 * i)) / kSampleCount * area;
+    const double place = (static_cast<double>(i) + uniform(seed, 3 * i)) / kSampleCount * area;
     const auto t = std::min<std::size_t>(std::upper_bound(area_to.begin(), area_to.end(), place) - area_to.begin(),
                                          area_to.size() - 1);
     const double root = std::sqrt(uniform(seed, 3 * i + 1));
