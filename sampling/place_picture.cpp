@@ -12,7 +12,7 @@
 namespace hilbrush {
 namespace {
 
-/// The field of the number of dots, if it is another than that of the energy.
+/// The field that decides the number of dots, if it differs from that of the energy.
 std::optional<ToneField> density_field(const ToneField& tone, ToneOptions options, const std::vector<double>& levels) {
   if (levels == std::vector<double>{1}) return std::nullopt;
   options.curve = density_curve(options.curve, levels);
@@ -39,7 +39,7 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
   SampleOptions sample = options.sample;
   const bool is_fine = sample.sampler == Sampler::kFine;
   if (is_fine) sample.sampler = Sampler::kCentroid;
-  // n rounds place n + 1 times; each tells its own share of the progress, and so does the search.
+  // n rounds place n + 1 times; each is an equal part of the progress, and so is the search.
   const double parts = options.predictive_rounds + 1 + (is_fine ? 1 : 0);
   int part = 0;
   const auto next_part = [&] {

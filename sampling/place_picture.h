@@ -11,8 +11,9 @@
 
 /// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of
 /// energy, the predictive loop, the search on the finished dots. place_dots() and the others do one thing each; this
-/// strings them together in the one order that makes sense:
-///   place by density -> fill holes -> levels -> (predict the picture, ask again: predictive_loop.h) -> fine (fine.h)
+/// combines them in the only useful order:
+///   place by density -> fill holes -> levels -> (predict the picture and place again: predictive_loop.h)
+///   -> fine (fine.h)
 namespace hilbrush {
 
 struct PictureOptions {
@@ -29,11 +30,11 @@ struct PictureReport {
   SampleReport path;
   PredictiveReport predictive;
   FillReport filled;
-  std::vector<std::uint64_t> dots_of_level;  ///< as many as there are levels
+  std::vector<std::uint64_t> dots_of_level;  ///< one element for each level
 };
 
-/// `tone` says what is asked for, `curve` and `tone_options` what it was made with. `predict` is called only if there
-/// are predictive rounds. `curve` is not walked by laminar slices. Deterministic. @throws InputError as place_dots().
+/// `tone` is the asked tone, made with `tone_options` on the mesh of `curve`. `predict` is called only if there are
+/// predictive rounds. Laminar slices use only the mesh of `curve`. Deterministic. @throws InputError as place_dots().
 DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, const ToneOptions& tone_options,
                           const PictureOptions& options, const PicturePredictor& predict,
                           PictureReport* report = nullptr, const Progress& progress = {});

@@ -21,28 +21,31 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kChoiceSweeps = 3, kNewtonSweeps = 3;
-/// Two dots nearer than this share of their spacing in the densest packing are pushed apart at last; the kernel, which
-/// is flat on top, leaves a few such pairs in 100,000.
-constexpr double kNearest = .58;
-/// A place that is farther from all dots, in spacings, draws that of its stratum: most holes of the kernel's choice lie
-/// on the border, where no neighbor is on the other side to be pushed back by.
-constexpr double kFarthest = .78;
+constexpr int kChoiceSweeps = 3;
+constexpr int kNewtonSweeps = 3;
+/// At the end two dots are pushed apart if they are nearer than this share of their distance in the densest packing.
+/// The kernel, which is flat on top, leaves a few such pairs in 100,000.
+constexpr double kMinDistance = .58;
+/// In spacings. A place that is farther from all dots attracts the dot of its stratum. Most such holes lie on the
+/// border of the surface: there no neighbor on the other side pushes the dots back.
+constexpr double kMaxDistance = .78;
 constexpr int kEveningRounds = 3;
-/// Who leaves one neighbor may come too near to another, and the last word is theirs.
+/// A dot that moves away from one neighbor may come too near to another, so the last sweeps only push dots apart.
 constexpr int kLastPushes = 3;
 constexpr int kSweeps = kChoiceSweeps + kNewtonSweeps + 2 * kEveningRounds + kLastPushes;
-/// Border within so many spacings of a place is looked at.
+/// In spacings of a place: border that is farther away is not looked for.
 constexpr double kToBorder = .4;
-/// How far Newton steps may take a dot from the place that was chosen, and a single one, in spacings.
-constexpr double kMaxWay = .25, kMaxStep = .15;
-/// Dots whose spacings differ by more do not see each other: what they would push, the surface around them would pull.
+/// In spacings: how far all Newton steps together may move a dot from the place that was chosen, and a single one.
+constexpr double kMaxOffset = .25;
+constexpr double kMaxStep = .15;
+/// Dots whose spacings differ by a larger factor do not push each other: the pull of the surface around them would undo
+/// it.
 constexpr double kMaxUnequal = 4;
 /// Distance of neighbors in the densest packing, at unit area a dot: sqrt(2 / sqrt(3)).
 constexpr double kDensestSpacing = 1.0745699318235418;
 
-/// What a single dot reaches at most: two dots see each other only if the distance of their strata is less than the
-/// sum.
+/// The largest reach of one dot: two dots push each other only if the distance of their strata is less than the sum of
+/// their reaches.
 double reach_of(const PlacedStratum& stratum) {
   // The kernel of two dots that are as unequal as may be reaches furthest beyond the sum of equal ones.
   static const double kMaxReach =
@@ -50,8 +53,9 @@ double reach_of(const PlacedStratum& stratum) {
   return stratum.radius_m + kMaxReach * stratum.spacing_m;
 }
 
-/// Strata see each other if they face the same way, or hang together over a fold; not through a wall.
-IndexLists find_neighbors(const SurfaceCurve& curve, const PlacedStrata& strata) {
+/// Strata whose dots push each other: those that face the same way or are connected over a fold, not those on two sides
+/// of a wall.
+IndexLists neighboring_strata(const SurfaceCurve& curve, const PlacedStrata& strata) {
   std::vector<SizedBall> balls;
   balls.reserve(strata.strata.size());
   for (const PlacedStratum& stratum : strata.strata) balls.push_back({stratum.middle_O, reach_of(stratum)});
@@ -81,7 +85,7 @@ class Relaxation {
       : curve_(curve),
         tone_(tone),
         strata_(strata),
-        neighbors_(find_neighbors(curve, strata)),
+        neighbors_(neighboring_strata(curve, strata)),
         coloring_(color_stretches(neighbors_)),
         pulls_(strata.strata.size()),
         dots_(strata.strata.size()) {
@@ -123,11 +127,16 @@ class Relaxation {
       Vector3d sum = Vector3d::Zero();
       int count = 0;
       for (std::size_t p = k * kTogether; p < (k + 1) * kTogether; ++p)
-        if (is_open(i, p)) sum += strata_.place(i, p).position_O - strata_.strata[i].middle_O, ++count;
+        if (is_open(i, p)) {
+          sum += strata_.place(i, p).position_O - strata_.strata[i].middle_O;
+          ++count;
+        }
       if (count == 0) continue;
       const Eigen::Vector3f place = (sum / count).cast<float>();
       const auto row = static_cast<Eigen::Index>(k);
-      pulls_[i].x[row] = place.x(), pulls_[i].y[row] = place.y(), pulls_[i].z[row] = place.z();
+      pulls_[i].x[row] = place.x();
+      pulls_[i].y[row] = place.y();
+      pulls_[i].z[row] = place.z();
       pulls_[i].share[row] = static_cast<float>(count) / kPlacesAStratum;
     }
   }
@@ -178,17 +187,17 @@ class Relaxation {
     for (const std::uint32_t j : neighbors_[i]) {
       const PairKernel kernel = kernel_of(i, j);
       slope.add(kernel, dots_[j].position_O);
-      // Many a neighbor's surface is out of reach of this one place of the stratum.
+      // The surface of many neighbors is out of reach of this one place of the stratum.
       const double reach = static_cast<double>(std::sqrt(kernel.support2)) + strata_.strata[j].radius_m;
       if ((strata_.strata[j].middle_O - here_O).squaredNorm() < reach * reach) add_pulls(slope, kernel, j);
     }
     const double h = strata_.strata[i].spacing_m;
-    // Curvatures below a third of a single kernel's are no guide to how far the valley is.
+    // Curvatures below a third of a single kernel's say nothing about how far the minimum is.
     const auto least = static_cast<float>(.15 / (static_cast<double>(PairKernel::kSigma2) * h * h));
     Vector3d offset = axes.leftCols<2>() * slope.newton_step(least).cast<double>();
     offset *= std::min(1., kMaxStep * h / std::max(offset.norm(), 1e-300));
     Vector3d from_home = here_O + offset - home_O;
-    from_home *= std::min(1., kMaxWay * h / std::max(from_home.norm(), 1e-300));
+    from_home *= std::min(1., kMaxOffset * h / std::max(from_home.norm(), 1e-300));
     move_to(dots_[i], curve_.surface(), tone_, home_O + from_home);
   }
 
@@ -215,10 +224,10 @@ class Relaxation {
     });
   }
 
-  /// The place of the stratum, and of the border beside it, that is farthest from all dots, if that is too far, draws
-  /// the stratum's own dot near enough.
+  /// Finds the place of the stratum, or of the border beside it, that is farthest from all dots. If it is too far away,
+  /// the stratum's own dot moves near enough.
   void close_hole(std::size_t i) {
-    const double enough = kFarthest * strata_.strata[i].spacing_m;
+    const double enough = kMaxDistance * strata_.strata[i].spacing_m;
     const Vector3d here_O = dots_[i].position_O;
     double worst = enough;
     Vector3d hole_O = here_O;
@@ -228,7 +237,10 @@ class Relaxation {
         if (nearest2 <= worst * worst) return;
         nearest2 = std::min(nearest2, (dots_[j].position_O - place_O).squaredNorm());
       }
-      if (nearest2 > worst * worst) worst = std::sqrt(nearest2), hole_O = place_O;
+      if (nearest2 > worst * worst) {
+        worst = std::sqrt(nearest2);
+        hole_O = place_O;
+      }
     };
     for (std::size_t p = 0; p < kPlacesAStratum; ++p)
       if (is_open(i, p)) look_at(strata_.place(i, p).position_O);
@@ -245,7 +257,7 @@ class Relaxation {
     Vector3d away = Vector3d::Zero();
     for (const std::uint32_t j : neighbors_[i]) {
       const double least =
-          kNearest * kDensestSpacing * .5 * (strata_.strata[i].spacing_m + strata_.strata[j].spacing_m);
+          kMinDistance * kDensestSpacing * .5 * (strata_.strata[i].spacing_m + strata_.strata[j].spacing_m);
       const Vector3d way = here_O - dots_[j].position_O;
       const double squared = way.squaredNorm();
       if (squared >= least * least || !(squared > 0)) continue;

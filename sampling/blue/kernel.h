@@ -27,7 +27,7 @@ struct PairKernel {
   float weight, support2, inverse_square;
 };
 
-/// Sums of kernels at all places of a stratum at a time.
+/// Sums of kernels at all places of a stratum at once.
 class PlaceSums {
  public:
   using Sums = Eigen::Array<float, static_cast<int>(kPlacesAStratum), 1>;
@@ -36,7 +36,9 @@ class PlaceSums {
     for (std::size_t p = 0; p < kPlacesAStratum; ++p) {
       const Eigen::Vector3f place = (strata.place(stratum, p).position_O - middle_O_).cast<float>();
       const auto row = static_cast<Eigen::Index>(p);
-      x_[row] = place.x(), y_[row] = place.y(), z_[row] = place.z();
+      x_[row] = place.x();
+      y_[row] = place.y();
+      z_[row] = place.z();
     }
   }
   /// A kernel at `position_O`, `factor` times its weight.

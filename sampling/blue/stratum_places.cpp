@@ -10,12 +10,12 @@
 namespace hilbrush {
 namespace {
 
-/// A stratum is about one spacing wide; places further apart than this are on two sides of a gap.
-constexpr double kWidest = 2.5;
+/// In spacings: a stratum is about one spacing wide; places farther apart than this are on two sides of a gap.
+constexpr double kMaxWidth = 2.5;
 
-/// The places within kWidest spacings of the one that has most of the others so near.
+/// The places within kMaxWidth spacings of the one that has the most others within that distance.
 std::uint8_t open_places(const PlacedStrata& strata, std::size_t s, double spacing_m) {
-  const double widest2 = std::pow(kWidest * spacing_m, 2);
+  const double widest2 = std::pow(kMaxWidth * spacing_m, 2);
   std::uint8_t best = 0;
   for (std::size_t a = 0; a < kPlacesAStratum; ++a) {
     std::uint8_t near = 0;

@@ -10,7 +10,7 @@
 /// The strata as `blue` sees them: a few places along each, where its dot may be, and how large it is.
 namespace hilbrush {
 
-/// Evenly along the stratum: each stands for as much mass.
+/// Evenly along the stratum: each stands for the same mass.
 inline constexpr std::size_t kPlacesAStratum = 8;
 
 struct PlacedStratum {
@@ -18,8 +18,8 @@ struct PlacedStratum {
   Eigen::Vector3d normal_O;      ///< unit
   double spacing_m = 0;          ///< root of its area
   double radius_m = 0;           ///< of its open places, about the middle
-  std::uint8_t open_places = 0;  ///< bit p: place p may be chosen. Of a stratum that leaps over a gap, only the heavier
-                                 ///< side is open.
+  std::uint8_t open_places = 0;  ///< bit p: place p may be chosen. Of a stratum that spans a gap, only the heavier side
+                                 ///< is open.
 };
 
 struct PlacedStrata {

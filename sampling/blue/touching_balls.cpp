@@ -155,12 +155,18 @@ IndexLists lists_of(std::size_t count, const std::vector<std::vector<Pair>>& chu
   IndexLists lists;
   lists.begins.assign(count + 1, 0);
   for (const auto& pairs : chunks)
-    for (const auto& [a, b] : pairs) ++lists.begins[a + 1], ++lists.begins[b + 1];
+    for (const auto& [a, b] : pairs) {
+      ++lists.begins[a + 1];
+      ++lists.begins[b + 1];
+    }
   for (std::size_t i = 0; i < count; ++i) lists.begins[i + 1] += lists.begins[i];
   lists.indices.resize(lists.begins.back());
   std::vector<std::size_t> next(lists.begins.begin(), lists.begins.end() - 1);
   for (const auto& pairs : chunks)
-    for (const auto& [a, b] : pairs) lists.indices[next[a]++] = b, lists.indices[next[b]++] = a;
+    for (const auto& [a, b] : pairs) {
+      lists.indices[next[a]++] = b;
+      lists.indices[next[b]++] = a;
+    }
   return lists;
 }
 

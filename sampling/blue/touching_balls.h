@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-/// Who is near whom, for sizes that may differ by orders of magnitude: dots lie dense where the picture is dark.
+/// Which balls overlap, of sizes that may differ by orders of magnitude: dots lie dense where the picture is dark.
 namespace hilbrush {
 
 struct SizedBall {
@@ -24,7 +24,7 @@ struct IndexLists {
   }
 };
 
-/// For each ball the others that overlap it and that `accept` (symmetric, thread-safe) agrees to. Balls are kept in
+/// For each ball the others that overlap it and that `accept` (symmetric, thread-safe) accepts. Balls are kept in
 /// grids of one octave of radius each; a pair is found from its smaller ball. Same lists for any number of threads.
 /// Cost: O(balls * octaves + pairs).
 IndexLists find_touching_balls(std::span<const SizedBall> balls,

@@ -11,9 +11,9 @@
 namespace hilbrush {
 namespace {
 
-/// The caller hears of progress after about so many shares of the triangles.
+/// Progress is reported about this many times.
 constexpr std::size_t kProgressSteps = 16;
-/// Of the work, as told to the caller.
+/// Share of flattening in the whole work, for progress.
 constexpr double kFlattenShare = .7;
 
 std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbors& neighbors,

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kBlackAbove = .95;  ///< share of the area with less curvature than what is black
-/// A bend of a radius so many times the surface's size is rounding.
+/// A radius of curvature above this, in units of the root of the surface's area, is taken for rounding.
 constexpr double kFlatRadius = 1e4;
 
 /// What belongs to a vertex: integrals over its mixed area.

@@ -15,19 +15,19 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// How far outside of a face rounding may put a place that is in it, as a share of the face.
+/// How far outside of a face rounding may put a point that is in it, as a share of the face.
 constexpr double kOnSide = 1e-12;
-/// Where a sequence hits blank surface within a patch, so many other places in the patch are tried.
+/// Where a sequence hits blank surface within a patch, up to this many positions in the patch are tried.
 constexpr int kMaxTries = 8;
 
-/// A place on the square, on the faces of a base quad.
+/// A point of the square, on one of the faces of a base quad.
 struct Lifted {
   std::uint32_t frame = 0;
   Vector2d b = Vector2d::Zero();
   bool is_inside = false;
 };
 
-/// `likely` is the frame to begin with, and then the one that was found: neighbors on the curve lie on few faces.
+/// `likely` is the frame to try first, and becomes the one that was found: neighbors on the curve lie on few faces.
 template <class Walk>
 inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likely) {
   const std::uint32_t count = walk.frame_count();
@@ -39,7 +39,7 @@ inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likel
   };
   auto [deepest, best_along] = look_into(best);
   if (!(deepest >= 0)) {
-    // All of them, without a way out between: which one it is can't be foreseen.
+    // All faces, without a branch: which one it is cannot be predicted.
     for (std::uint32_t i = 0; i < count; ++i) {
       const auto [depth, along] = look_into(i);
       const bool is_deeper = depth > deepest;
@@ -57,12 +57,12 @@ inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likel
   return {best, frame.b + frame.face_to_b * best_along, deepest >= -kOnSide};
 }
 
-/// Steps of the curve's table that are fine enough for a patch with so many dots.
+/// Steps of the curve's table that are fine enough for a patch with this many dots.
 int curve_steps(double dots) {
   return dots < .5 ? 1 : dots < 30 ? 2 : dots < 2000 ? 3 : dots < 1e5 ? 4 : kMaxCurveSteps;
 }
 
-/// Mean places of stretches of a curve. Where one ends, the next one most often begins.
+/// Mean positions of stretches of a curve. Most begin where the one before ended, so that moment is kept.
 class CurveStretches {
  public:
   template <class Curve>
@@ -89,7 +89,7 @@ class CurveStretches {
   Vector2d moment_ = Vector2d::Zero();  ///< up to last_
 };
 
-/// What both writers do with a place.
+/// What both writers share.
 class DotWriter {
  public:
   DotWriter(const DotPlan& plan, DotTriangles& triangles, std::vector<Dot>& dots)
@@ -127,7 +127,10 @@ class CenterWriter : public DotWriter {
         const double quad_mass = mass.mass_of(q);
         sum += quad_mass;
         part.moment_O += mass.quads()[q].moment_O;
-        if (quad_mass > heaviest) heaviest = quad_mass, heaviest_quad = q;
+        if (quad_mass > heaviest) {
+          heaviest = quad_mass;
+          heaviest_quad = q;
+        }
       }
       if (sum > 0) {
         last_quad_ = heaviest_quad;
@@ -168,7 +171,7 @@ class CenterWriter : public DotWriter {
     add_pieces(walk, node, from, to);
   }
 
-  /// Strata that lie in one patch as a whole: all there is to say of those in an even one is where their middles are.
+  /// Strata that lie entirely in one patch: in an even one each needs only its middle.
   template <class Curve>
   void add_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind,
                   std::span<const double> ends, std::uint64_t index) {
@@ -179,7 +182,7 @@ class CenterWriter : public DotWriter {
   }
 
   void close(std::uint64_t) {
-    // Rounding may leave nothing to a stratum at the very end of the curve.
+    // Rounding may leave a stratum at the very end of the curve without mass.
     if (stratum_.is_empty()) add_quads(last_quad_, last_quad_ + 1);
     const StratumPart& part = stratum_.heaviest();
     const PaintedPoint center = center_on_surface(plan_.mass, triangles_, part);
@@ -188,7 +191,7 @@ class CenterWriter : public DotWriter {
   }
 
  private:
-  /// Step by step for all of them, so that one need not wait for another.
+  /// Each step for all strata before the next step, so that the processor need not wait for one result after another.
   template <class Curve>
   void add_even_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
                        std::span<const double> ends, std::uint64_t index) {
@@ -210,7 +213,7 @@ class CenterWriter : public DotWriter {
     }
   }
 
-  /// Of a stretch of an even patch, on the square.
+  /// The mean position of a stretch of an even patch, on the square.
   template <class Node>
   Vector2d mean_place(const Node& node, double from, double to) {
     const int steps = curve_steps(node.mass / plan_.rule.dot_mass);
@@ -223,7 +226,7 @@ class CenterWriter : public DotWriter {
     return part;
   }
 
-  /// Notes in which triangle a bit lies.
+  /// Records in which triangle a part of the stratum lies.
   void add_in_triangle(StratumPart& part, std::uint32_t triangle, const Vector2d& moment_b) const {
     if (is_new_) part.triangle = triangle;
     if (part.triangle != triangle)
@@ -275,7 +278,7 @@ class CenterWriter : public DotWriter {
     part.heaviest_quad = StratumPart::kNoQuad;
   }
 
-  /// Where a stretch of a small patch lies beside the patch's middle, as the curve runs.
+  /// Moves the moment of a small patch, taken at the patch's middle, to where the curve runs on this stretch.
   template <class Curve>
   void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
                      double from, double to) {
@@ -308,12 +311,12 @@ class PlaceWriter : public DotWriter {
            std::uint64_t) {
     put_at(point_in(walk, node, share), walk.chart());
   }
-  /// At the end of the curve, beyond what rounding has left of its last quad.
+  /// At the end of the curve, when rounding has put the number beyond its last quad.
   void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads()[quad].chart); }
 
  private:
-  /// Within a patch the mass is taken as even on what is painted of it: where the curve is on blank surface, or beside
-  /// the surface, other places of the patch have their turn.
+  /// Within a patch the mass is taken as evenly spread over its painted surface: where the curve is on blank surface,
+  /// or beside the surface, other positions in the patch are tried.
   template <class Curve>
   SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double share) {
     if constexpr (QuadWalk<Curve>::kDimensions == 2) {

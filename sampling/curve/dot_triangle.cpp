@@ -9,7 +9,7 @@ DotTriangle::DotTriangle(const Surface& surface, const ToneField& tone, std::uin
       tone_(tone.on(triangle)) {}
 
 Dot DotTriangle::dot_at(const Eigen::Vector3d& place, std::uint32_t component, std::optional<double> asked) const {
-  // A beam that is aimed at the very edge of an open surface may pass it by.
+  // See surface.cpp: a beam may miss the very edge of an open surface.
   const Eigen::Vector3d least = surface_.least_barycentric.cast<double>();
   Eigen::Vector3d b = place;
   if (b[0] < least[0] || b[1] < least[1] || b[2] < least[2]) {

@@ -7,10 +7,10 @@
 #include "sampling/dots/dots.h"
 #include "sampling/tone/tone_field.h"
 
-/// Dots at places of triangles.
+/// Dots at points of triangles.
 namespace hilbrush {
 
-/// What the dots of one triangle take from it, made ready for many.
+/// What the dots of one triangle take from it, prepared once for many dots.
 class DotTriangle {
  public:
   DotTriangle() = default;
@@ -19,8 +19,8 @@ class DotTriangle {
   std::uint32_t triangle() const { return triangle_; }
   /// The asked tone.
   double asked(const Eigen::Vector3d& barycentric) const { return tone_.asked({barycentric[1], barycentric[2]}); }
-  /// The dot there, moved a hair inside the triangle. `asked` is the tone at `barycentric`, which is most often the
-  /// dot's own, if it is known.
+  /// The dot there, moved a hair inside the triangle. `asked` is the tone at `barycentric`, if it is known: it is
+  /// used unless the dot was moved.
   Dot dot_at(const Eigen::Vector3d& barycentric, std::uint32_t component, std::optional<double> asked = {}) const;
 
  private:
@@ -30,7 +30,7 @@ class DotTriangle {
   TriangleTone tone_;
 };
 
-/// Keeps the triangles met last. What it returns depends on its argument alone.
+/// A cache of triangles. What it returns depends on its argument alone.
 class DotTriangles {
  public:
   DotTriangles(const Surface& surface, const ToneField& tone) : surface_(surface), tone_(tone) {}

@@ -6,7 +6,7 @@
 #include "sampling/curve/chart.h"
 #include "sampling/tone/tone_field.h"
 
-/// The affine maps between a face's triangle, the square, space and the texture; and a store of those made last, so
+/// The affine maps between a face's triangle, the square, space and the texture; and a cache of the latest ones, so
 /// that quads which share a face share its frame.
 namespace hilbrush {
 
@@ -16,7 +16,7 @@ struct FaceFrame {
 
   std::uint32_t triangle;
   Eigen::Vector3d origin_O, e1_O, e2_O;  ///< corner 0 of the triangle; from there to corners 1 and 2
-  Eigen::Vector2d place;                 ///< of the face's first corner
+  Eigen::Vector2d place;                 ///< of the face's first corner on the square
   Eigen::Matrix2d to_face;               ///< from there to coordinates along the face's sides
   Eigen::Vector2d b;                     ///< barycentric coordinates of the face's first corner
   Eigen::Matrix2d face_to_b;
@@ -36,14 +36,15 @@ class FaceFrames {
 
   /// The frames of a quad's faces, in the quad's order; valid until the next call.
   void fetch(const Chart& chart, const BaseQuad& quad, std::vector<FaceFrame*>& frames);
-  /// The tone on a frame's triangle, which many frames are never asked for.
+  /// The tone on a frame's triangle, computed at first use: many frames need none.
   const TriangleTone& tone_on(FaceFrame& frame) const {
     if (!frame.tone) frame.tone = tone_.on(frame.triangle);
     return *frame.tone;
   }
 
  private:
-  static constexpr std::size_t kMaxFrames = 1024, kSlots = 4096;
+  static constexpr std::size_t kMaxFrames = 1024;
+  static constexpr std::size_t kSlots = 4096;
   static constexpr std::uint32_t kEmpty = ~std::uint32_t{0};
   struct Slot {
     std::uint32_t face = kEmpty, frame = 0;
@@ -54,8 +55,8 @@ class FaceFrames {
 
   const ToneField& tone_;
   const Chart* chart_ = nullptr;
-  std::vector<FaceFrame> frames_;  ///< never grows beyond its reserve: frames stay where they are
-  std::vector<Slot> slots_;        ///< a hash table, searched upwards
+  std::vector<FaceFrame> frames_;  ///< never grows beyond its reserved memory: pointers to frames stay valid
+  std::vector<Slot> slots_;        ///< a hash table, with linear probing
 };
 
 }  // namespace hilbrush

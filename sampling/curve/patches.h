@@ -4,7 +4,7 @@
 
 #include "sampling/curve/dot_block.h"
 
-/// Patches as plain values: to look at what the walk does, in tests and pictures.
+/// Patches as plain values, to show what the walk does in tests and pictures.
 namespace hilbrush {
 
 /// What a patch holds of one triangle.
@@ -23,7 +23,7 @@ struct Patch {
   std::vector<PatchPiece> pieces;
 };
 
-/// All patches with mass, in order of the curve, as if something were asked for everywhere.
+/// All patches with mass, in order of the curve, as if something were needed everywhere.
 void visit_patches(const CurveMass& mass, const PatchRule& rule, const std::function<void(const Patch&)>& visit);
 
 /// All strata, as the stretches of patches that they are cut from: visit(stratum, patch, from, to), with shares of the

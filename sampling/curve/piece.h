@@ -38,13 +38,13 @@ struct Piece {
   std::span<const Corner> all() const { return {corners.data(), corner_count}; }
 
   void add(const Corner& corner) {
-    // The cap is never met by a convex polygon; one that rounding has bent loses a corner on which nothing depends.
+    // A convex polygon never has more. One that rounding has bent loses a corner, which does no harm.
     if (corner_count == kMaxCorners) return;
     if (corner_count > 0 && corners[corner_count - 1].b == corner.b) return;
     corners[corner_count++] = corner;
   }
 
-  /// In units of the triangle's own twice.
+  /// In barycentric coordinates: .5 for the whole triangle.
   double area_b() const {
     double twice = 0;
     for (std::uint32_t i = 2; i < corner_count; ++i) {
@@ -56,8 +56,8 @@ struct Piece {
 };
 
 /// Cuts a piece by the plane place[axis] = at, and hands the corners of its parts on, in order. What lies on the plane
-/// belongs to the upper part. Both parts get the very same new corners, so that no area is lost or counted twice,
-/// however badly the places are rounded.
+/// belongs to the upper part. Both parts get identical new corners, so that no area is lost or counted twice, whatever
+/// the rounding.
 template <int kDimensions, class AddLower, class AddUpper>
 void cut_corners(const Piece<kDimensions>& piece, int axis, double at, AddLower add_lower, AddUpper add_upper) {
   if (piece.corner_count == 0) return;
@@ -77,7 +77,8 @@ void cut_corners(const Piece<kDimensions>& piece, int axis, double at, AddLower 
       add_lower(*q);
     else
       add_upper(*q);
-    p = q, dp = dq;
+    p = q;
+    dp = dq;
   }
 }
 
@@ -91,7 +92,7 @@ void cut_piece(const Piece<kDimensions>& piece, int axis, double at, Piece<kDime
       [&](const Corner& corner) { upper.add(corner); });
 }
 
-/// One part alone.
+/// One part only.
 template <int kDimensions>
 Piece<kDimensions> part_of(const Piece<kDimensions>& piece, int axis, double at, bool is_upper) {
   using Corner = PieceCorner<kDimensions>;

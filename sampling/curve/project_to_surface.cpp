@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Across needles a pitch is many triangles.
+/// Triangles. Across needles one pitch may span many.
 constexpr int kMaxWalk = 64;
 constexpr int kMaxHalvings = 40;
 
@@ -28,7 +28,7 @@ SurfacePoint walk_towards(const Surface& surface, const SurfacePoint& start, con
   for (int step = 0; step < kMaxWalk; ++step) {
     NearestPoint best = here;
     for (int side = 0; side < 3; ++side) {
-      // Only across a side on which the nearest point lies: the one opposite a corner without weight.
+      // Only across a side on which the nearest point lies: opposite a corner whose coordinate is 0.
       if (here.point.barycentric[(side + 2) % 3] > 0) continue;
       const TriangleSide across = surface.neighbors[here.point.triangle][static_cast<std::size_t>(side)];
       if (across == kNoSide) continue;

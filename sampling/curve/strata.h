@@ -11,8 +11,8 @@
 #include "sampling/curve/quad_walk.h"
 #include "sampling/curve/sequence.h"
 
-/// Sinks of the walk: one cuts the curve's mass into strata, one finds places along it. Both work on a block of dots
-/// and know nothing of what comes before or after it, so that blocks may be made in any order.
+/// Sinks of the walk: one cuts the curve's mass into strata, one finds points along it. Both work on a block of dots
+/// and need nothing of what comes before or after it, so that blocks may be made in any order.
 namespace hilbrush {
 
 /// Equal stretches of the whole curve's mass, one for each dot.
@@ -25,7 +25,7 @@ struct Strata {
   }
 };
 
-/// What dots are to be placed: the same for all blocks.
+/// How dots are to be placed: the same for all blocks.
 struct DotPlan {
   DotPlan(const CurveMass& mass, const SampleOptions& options, std::uint64_t count);
 
@@ -44,12 +44,12 @@ void add_one_by_one(Consumer& consumer, Add add, std::span<const double> ends, s
   }
 }
 
-/// Cuts strata `first` to `last` - 1 out of patches, and tells `consumer`:
+/// Cuts strata `first` to `last` - 1 out of patches, and calls of `consumer`:
 ///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as shares of
 ///                                                        its mass
 ///   void close(std::uint64_t index)                      it is complete
 ///   void add_strata(walk, node, kind, std::span<const double> ends, std::uint64_t index)
-///                                                        all of it at once for strata in one patch as a whole,
+///                                                        instead, for strata that lie entirely in one patch,
 ///                                                        from `index` on, each between two ends
 template <class Consumer>
 class StrataCutter {
@@ -85,14 +85,14 @@ class StrataCutter {
         [&](std::span<const double> ends, std::uint64_t index) { add_one_by_one(consumer_, add, ends, index); });
   }
 
-  /// The curve is over: what rounding has left open ends here.
+  /// At the end of the curve: closes the strata that rounding has left open.
   void finish() {
     while (!is_done()) pass();
   }
 
  private:
-  /// So many whole strata are told of at once.
-  static constexpr std::size_t kTogether = 32;
+  /// This many whole strata are handed over at once.
+  static constexpr std::size_t kStrataAtOnce = 32;
 
   template <class Add, class AddStrata>
   void cut(double at, double mass, Add add, AddStrata add_strata) {
@@ -105,12 +105,12 @@ class StrataCutter {
       share = next;
       pass();
     }
-    // From here on each begins where the one before ends.
+    // From here on each stratum begins where the one before ends.
     while (is_next_here()) {
-      std::array<double, kTogether + 1> ends{share};
+      std::array<double, kStrataAtOnce + 1> ends{share};
       std::size_t count = 0;
       const std::uint64_t first = index_;
-      while (count < kTogether && is_next_here() && share_of_next() > share) {
+      while (count < kStrataAtOnce && is_next_here() && share_of_next() > share) {
         ends[++count] = share = share_of_next();
         ++index_;
         go_on();
@@ -136,11 +136,11 @@ class StrataCutter {
   const Strata& strata_;
   Consumer& consumer_;
   std::uint64_t index_, last_;
-  bool is_open_;  ///< the curve has reached the beginning of stratum index_
+  bool is_open_;  ///< the walk has reached the beginning of stratum index_
   double next_;   ///< where the current stratum ends, or the first one begins
 };
 
-/// Finds numbers `first` to `last` - 1 of a sequence along the curve, and tells `consumer`:
+/// Finds numbers `first` to `last` - 1 of a sequence along the curve, and calls of `consumer`:
 ///   void put(walk, node, kind, double share, std::uint64_t index)   where in a patch
 template <class Consumer>
 class PlaceFinder {
@@ -173,7 +173,7 @@ class PlaceFinder {
   double next_;
 };
 
-/// Hands the cutter (or finder) what it asks for, and counts patches.
+/// Hands patches on to the cutter (or finder), and counts them.
 template <class Cutter>
 class CountingSink {
  public:
@@ -197,7 +197,7 @@ class CountingSink {
   std::vector<std::size_t>& patches_at_depth_;
 };
 
-/// One walk for each kind of curve, made when it is needed.
+/// One walk for each kind of curve, made at first use.
 class Walks {
  public:
   explicit Walks(const DotPlan& plan) : plan_(plan) {}
@@ -218,10 +218,11 @@ class Walks {
       walks_;
 };
 
-/// A base quad with no more than this share of a small patch's mass is cut as it is: where in it matters to nobody.
+/// A base quad with at most this share of a small patch's mass is cut without walking it: where in it a stratum ends
+/// makes no difference.
 inline constexpr double kLightShare = .5;
 
-/// Strata `first` to `last` - 1, told to `consumer` as StrataCutter does, and whole base quads by
+/// Cuts strata `first` to `last` - 1, with the calls of StrataCutter to `consumer`, and for whole base quads
 ///   void add_quads(std::size_t first, std::size_t last)           `last` not included
 ///   void add_quad(std::size_t quad, double from, double to)   shares of its mass
 template <class Consumer>
@@ -255,8 +256,8 @@ void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uin
   cutter.finish();
 }
 
-/// Numbers `first` to `last` - 1 of the plan's sequence, told to `consumer` as PlaceFinder does, and what rounding has
-/// left beyond the last quad by
+/// Finds numbers `first` to `last` - 1 of the plan's sequence, with the calls of PlaceFinder to `consumer`, and for
+/// those that rounding has put beyond the last quad
 ///   void put_in_quad(std::size_t quad)
 template <class Consumer>
 void find_places(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,

@@ -9,16 +9,17 @@
 namespace hilbrush {
 namespace {
 
-/// A place that asks for less than this share of what its stratum asks for is blank.
+/// A point that asks for less than this share of what its stratum's heaviest point asks for counts as blank.
 constexpr double kBlankShare = 1e-3;
-/// ... which no place does that asks for this much: nothing asks for a thousand times as much.
+/// Asked tone. A point that asks for this much cannot be blank: the tone that would make it so is 10, and tones end
+/// at 1.
 constexpr double kSurelyPainted = .01;
 
 /// Of a base quad's faces with mass, the point nearest to `target_O`.
 SurfacePoint nearest_in_quad(const CurveMass& mass, std::size_t quad_index, const Eigen::Vector3d& target_O) {
   const std::span<const PieceMass> pieces = mass.pieces_of(mass.quads()[quad_index]);
   const TexturedMesh& mesh = mass.mesh();
-  // With few dots on a large mesh nothing of it is in the cache: all is sent for before any of it is waited for.
+  // With few dots on a large mesh nothing of it is in the cache: all is requested before the first is needed.
   for (const PieceMass& piece : pieces) __builtin_prefetch(&mesh.triangles[piece.triangle]);
   for (const PieceMass& piece : pieces)
     for (const std::uint32_t vertex : mesh.triangles[piece.triangle]) __builtin_prefetch(&mesh.vertices[vertex]);

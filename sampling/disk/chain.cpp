@@ -8,10 +8,10 @@
 namespace hilbrush {
 namespace {
 
-/// Points that can be asked for the nearest and taken away: a k-d tree with the number of points left in each part.
-class Vanishing {
+/// Points of which the nearest can be found and any be removed: a k-d tree that counts the points left in each part.
+class RemovablePoints {
  public:
-  explicit Vanishing(std::vector<Eigen::Vector3d> points) : points_(std::move(points)), order_(points_.size()) {
+  explicit RemovablePoints(std::vector<Eigen::Vector3d> points) : points_(std::move(points)), order_(points_.size()) {
     std::iota(order_.begin(), order_.end(), 0u);
     place_.resize(points_.size());
     build(0, points_.size());
@@ -104,7 +104,7 @@ class Vanishing {
   std::vector<char> is_gone_;
 };
 
-/// Which corner the symmetry puts where `corner` is.
+/// The corner that the symmetry moves to where `corner` is.
 std::size_t corner_before(const Symmetry& symmetry, std::size_t corner) {
   bool x = (corner == 1 || corner == 2) != symmetry.is_mirrored_x, y = (corner >= 2) != symmetry.is_mirrored_y;
   if (symmetry.is_swapped) std::swap(x, y);
@@ -128,13 +128,13 @@ std::size_t symmetry_count(const ChainPiece& piece) {
 std::vector<std::uint32_t> nearest_next(const std::vector<ChainPiece>& pieces) {
   std::vector<Eigen::Vector3d> corners;
   for (const ChainPiece& piece : pieces) corners.insert(corners.end(), piece.corners_O.begin(), piece.corners_O.end());
-  Vanishing left(std::move(corners));
+  RemovablePoints left(std::move(corners));
   std::vector<std::uint32_t> chain;
   for (std::uint32_t piece = 0, corner = 0;;) {
     chain.push_back(piece);
     for (std::uint32_t k = 0; k < 4; ++k) left.remove(4 * piece + k);
     if (chain.size() == pieces.size()) return chain;
-    // Mirrors lead from any corner to the one beside it, or across from it, as from corner 0 to the end.
+    // After a mirror symmetry the end is beside the beginning, or across from it, as it is for corner 0.
     const std::uint32_t end = pieces[piece].end_corner == 1 ? corner ^ 1u : corner ^ 2u;
     const std::uint32_t nearest = left.nearest(pieces[piece].corners_O[end]);
     piece = nearest / 4;
@@ -147,7 +147,7 @@ std::vector<std::uint32_t> nearest_next(const std::vector<ChainPiece>& pieces) {
 std::vector<ChainLink> chain_pieces(const std::vector<ChainPiece>& pieces) {
   if (pieces.empty()) return {};
   const std::vector<std::uint32_t> order = nearest_next(pieces);
-  // The shortest way through all symmetries, piece by piece.
+  // Dynamic programming: the shortest path to each symmetry of a piece over all symmetries of the piece before.
   std::vector<std::array<std::uint8_t, kSymmetryCount>> from(order.size());
   std::array<double, kSymmetryCount> length{};
   for (std::size_t i = 1; i < order.size(); ++i) {

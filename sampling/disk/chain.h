@@ -7,7 +7,7 @@
 /// The order in which many pieces of surface are walked, and from which corner each.
 namespace hilbrush {
 
-/// What may be done to a piece before it is walked.
+/// Which symmetries a piece allows: how it may be laid before it is walked.
 enum class Turns : std::uint8_t {
   kNone,
   kMirrors,         ///< of a row of squares: in x and in y
@@ -15,15 +15,15 @@ enum class Turns : std::uint8_t {
 };
 
 /// A piece for the chain: its curve begins at corner 0 (lower left; then lower right, upper right, upper left) and ends
-/// at `end_corner`, or the same after a symmetry.
+/// at `end_corner`; the same holds after a symmetry.
 struct ChainPiece {
   std::array<Eigen::Vector3d, 4> corners_O;
   std::uint8_t end_corner = 1;
   Turns turns = Turns::kNone;
 };
 
-/// A symmetry of a row of squares: first x and y are swapped, then mirrored. It chooses where the curve begins;
-/// mirrored in x it runs backwards.
+/// A symmetry of a row of squares: first x and y are swapped, then mirrored. It decides in which corner the curve
+/// begins; mirrored in x it runs backwards.
 struct Symmetry {
   bool is_swapped = false, is_mirrored_x = false, is_mirrored_y = false;
 
@@ -38,8 +38,8 @@ struct ChainLink {
   Symmetry symmetry;
 };
 
-/// Begins with piece 0 and goes on to the piece with the nearest corner; then the symmetries are chosen so that the sum
-/// of all jumps is least. Cost about O(n log n).
+/// Begins with piece 0 and continues with the piece that has the nearest corner, and so on; then chooses the symmetries
+/// so that the sum of all jumps is least. Cost about O(n log n).
 std::vector<ChainLink> chain_pieces(const std::vector<ChainPiece>& pieces);
 
 /// Sum of the jumps from the end of each piece to the beginning of the next.

@@ -18,8 +18,10 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double kMinWeight = 1e-4, kMaxWeight = 1e3;
-/// Below this METIS has nothing to gain.
+/// Of a cotangent weight: a map without flipped faces needs positive ones, and an accurate factor needs bounded ones.
+constexpr double kMinWeight = 1e-4;
+constexpr double kMaxWeight = 1e3;
+/// Vertices; for smaller graphs METIS gains nothing.
 constexpr std::size_t kSmallGraph = 2000;
 
 double cotan_half(const Disk& disk, std::uint32_t face, std::size_t from, std::size_t to) {
@@ -28,7 +30,7 @@ double cotan_half(const Disk& disk, std::uint32_t face, std::size_t from, std::s
   const Eigen::Vector3d u = disk.positions()[f[from]] - disk.positions()[f[apex]];
   const Eigen::Vector3d v = disk.positions()[f[to]] - disk.positions()[f[apex]];
   const double sine = u.cross(v).norm(), cosine = u.dot(v);
-  // Of a triangle (almost) without area a finite share, so that its neighbor's still counts.
+  // A triangle (almost) without area gets a finite weight, so that its neighbor's still counts.
   constexpr double kMaxHalf = 100 * kMaxWeight;
   return std::abs(cosine) < 2 * kMaxHalf * sine ? .5 * cosine / sine : std::copysign(kMaxHalf, cosine);
 }
@@ -83,7 +85,7 @@ WeightedGraph make_graph(const Disk& disk, Half half, Limit limit) {
   return graph;
 }
 
-/// The places of the free vertices in the system: along `order`, -1 for fixed ones.
+/// The row of each free vertex in the system: along `order`, -1 for fixed ones.
 struct FreeVertices {
   std::vector<int> index;
   std::vector<std::uint32_t> vertices;
@@ -98,8 +100,8 @@ struct FreeVertices {
   }
 };
 
-/// Row i of the system, without fixed vertices and, of a symmetric one, without what lies right of the diagonal; what
-/// the fixed ones give goes to the right sides.
+/// The linear system of the free vertices; of a symmetric one only up to the diagonal of each row. The terms of the
+/// fixed vertices are in the right sides.
 struct System {
   Sparse rows;  ///< column i holds row i
   Eigen::MatrixXd right;
@@ -149,7 +151,7 @@ std::vector<std::uint32_t> dissected(const WeightedGraph& graph) {
   auto vertex_count = static_cast<idx_t>(graph.vertex_count());
   std::vector<idx_t> begin(graph.begin.begin(), graph.begin.end()), to(graph.to.begin(), graph.to.end());
   std::vector<idx_t> order(graph.vertex_count()), place(graph.vertex_count());
-  // METIS draws from the library's one rand(), seeded anew by each call.
+  // METIS uses the C library's only rand(), which each call seeds again.
   static std::mutex metis;
   const std::lock_guard lock(metis);
   std::array<idx_t, METIS_NOPTIONS> options{};
@@ -194,7 +196,7 @@ bool solve_symmetric(const WeightedGraph& graph, const std::vector<std::uint32_t
   const FreeVertices free(order, is_fixed);
   if (free.vertices.empty()) return true;
   const System system(graph, free, true, values);
-  // The vertices are in order already. A symmetric matrix' lower rows are its upper columns.
+  // The vertices are in order already. The lower rows of a symmetric matrix are its upper columns.
   const Eigen::SimplicialLDLT<Sparse, Eigen::Upper, Eigen::NaturalOrdering<int>> solver(system.rows);
   return solve(solver, free, system.right, values);
 }

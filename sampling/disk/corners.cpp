@@ -10,16 +10,16 @@
 namespace hilbrush {
 namespace {
 
-/// A boundary vertex that turns by more is a corner of the shape itself.
+/// Radians. A boundary vertex that turns by more is a corner of the shape itself.
 constexpr double kShapeCornerTurn = std::numbers::pi / 4;
 constexpr double kMinSideShare = .005;
-/// Of more forks than these none is tried as a corner.
+/// With more forks than this the corners are not chosen among them: the search takes all combinations of four.
 constexpr std::size_t kMaxForks = 16;
 
-/// A slit's corners, as a share of the loop from its tips: where tan(x) = (sqrt(2) - 1)^2 for a quarter turn x a half.
+/// Distance of a slit's corners from its tips, as a share of the loop: x / pi where tan(x) = (sqrt(2) - 1)^2.
 const double kSlitCorner = std::atan(3 - 2 * std::numbers::sqrt2) / std::numbers::pi;
 
-/// Adds the place nearest to the middle of the longest stretch between two corners.
+/// Adds the side nearest to the middle of the longest stretch between two corners.
 void add_middle_of_longest(std::vector<std::size_t>& corners, const std::vector<double>& along) {
   const std::size_t n = along.size() - 1;
   const auto at = [&](std::size_t i) { return along[i % n] + (i >= n ? along.back() : 0); };
@@ -57,7 +57,7 @@ std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<do
   return corners;
 }
 
-/// Nearest to shares of the loop's length.
+/// The sides that begin nearest to given shares of the loop's length.
 Corners corners_at(const std::array<double, 4>& shares, const std::vector<double>& along) {
   const std::size_t n = along.size() - 1;
   Corners corners{};
@@ -70,7 +70,7 @@ Corners corners_at(const std::array<double, 4>& shares, const std::vector<double
   return corners;
 }
 
-/// Four of the forks so that opposite sides are alike and none is short.
+/// Four of the forks, so that opposite sides are about equal and none is short.
 std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<double>& along) {
   std::vector<std::size_t> forks;
   for (std::size_t i = 0; i < cut.outer.size(); ++i)
@@ -87,29 +87,33 @@ std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<do
           const auto sides = side_lengths(corners, along);
           const double shortest = *std::min_element(sides.begin(), sides.end());
           const double score = std::abs(sides[0] - sides[2]) + std::abs(sides[1] - sides[3]) - .1 * shortest;
-          if (shortest > kMinSideShare * along.back() && score < best_score) best = corners, best_score = score;
+          if (shortest > kMinSideShare * along.back() && score < best_score) {
+            best = corners;
+            best_score = score;
+          }
         }
   return best;
 }
 
-/// Where a place of a slit's loop comes to lie on the rim of the half plane, if the surface is a sphere and the slit
-/// goes from pole to pole; corners at +-(sqrt(2) - 1) and +-(sqrt(2) + 1), the loop's start at 0.
+/// Where a point of a slit's loop lies on the boundary of the half plane, if the surface is a sphere and the slit goes
+/// from pole to pole; corners at +-(sqrt(2) - 1) and +-(sqrt(2) + 1), the loop's start at 0.
 double on_half_plane(double share) {
   const double root = std::sqrt(std::tan(std::numbers::pi * std::min(share, 1 - share)));
   return share < .5 ? root : -root;
 }
 
-/// Shares of a side of the square, 0 to 1, for the part of the rim from sqrt(2) - 1 to sqrt(2) + 1: the lemniscate's
-/// arc.
+/// Shares of a side of the square, 0 to 1, for the part of the boundary from sqrt(2) - 1 to sqrt(2) + 1: the
+/// lemniscate's arc.
 double along_square(double x) {
   const double p = std::clamp(.5 * (x - 1 / x), -1., 1.);
   const double arc = std::ellint_1(std::numbers::sqrt2 / 2, std::asin(std::abs(p) * std::sqrt(2 / (1 + p * p))));
   return .5 * (1 + std::copysign(arc / std::comp_ellint_1(std::numbers::sqrt2 / 2), p));
 }
 
-/// Sides of the square up to a place of a slit's loop, from the loop's start in the middle of a side: 0 to 4.
+/// Sides of the square up to a point of a slit's loop, from the loop's start in the middle of a side: 0 to 4.
 double along_slit(double share) {
-  constexpr double kLow = std::numbers::sqrt2 - 1, kHigh = std::numbers::sqrt2 + 1;
+  constexpr double kLow = std::numbers::sqrt2 - 1;
+  constexpr double kHigh = std::numbers::sqrt2 + 1;
   const double x = on_half_plane(share);
   // A quarter turn of the square takes x to (1 + x) / (1 - x).
   if (x >= kLow && x <= kHigh) return .5 + along_square(x);
@@ -153,7 +157,8 @@ std::vector<double> boundary_measure(const CutDisk& cut, const std::vector<doubl
   std::vector<double> measure = along;
   if (!is_slit(cut)) return measure;
   for (double& place : measure) place = along_slit(std::min(place / along.back(), 1.));
-  measure.front() = 0, measure.back() = 4;
+  measure.front() = 0;
+  measure.back() = 4;
   return measure;
 }
 

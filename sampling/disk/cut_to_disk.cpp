@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "sampling/base/union_find.h"
@@ -275,9 +276,9 @@ BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
   return loop;
 }
 
-CutResult cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
-                      const CutOptions& options) {
-  if (component.genus < 0) return {std::nullopt, "its triangles do not form a surface"};
+Result<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
+                            const CutOptions& options) {
+  if (component.genus < 0) return Failure{"its triangles do not form a surface"};
   CutDisk cut{Disk(mesh, neighbors, component.triangles), {}, false, 0, {}};
   Disk& disk = cut.disk;
   refine_for_map(disk, options.area_share);
@@ -294,13 +295,13 @@ CutResult cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, cons
     marks.start = edges.back();
   }
   if (!marks.start) marks.forks = forks_of(disk, edges, is_boundary);
-  if (!open_cuts(cut, edges, marks)) return {std::nullopt, "no cut was found that makes it a disk"};
+  if (!open_cuts(cut, edges, marks)) return Failure{"no cut was found that makes it a disk"};
   if (length_of(disk, cut.outer) < kMinBoundary * std::sqrt(component.area_m2)) {
     std::vector<std::uint32_t> all(disk.positions().size());
     std::iota(all.begin(), all.end(), 0u);
     extend_cut(cut, all);
   }
-  return {std::move(cut), {}};
+  return cut;
 }
 
 bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {

@@ -1,7 +1,8 @@
 #pragma once
-#include <optional>
-#include <string>
+#include <cstddef>
+#include <vector>
 
+#include "sampling/base/result.h"
 #include "sampling/disk/disk.h"
 
 /// Makes a topological disk of a component: cuts it open along short paths.
@@ -26,18 +27,13 @@ struct CutOptions {
   std::size_t max_holes = 32;
 };
 
-struct CutResult {
-  std::optional<CutDisk> cut;
-  std::string reason;  ///< why there is none
-};
-
 /// Coarse and blunt-angled triangulations are refined first, within bounds.
 /// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter). Handles and
 /// several boundaries: along the shortest arcs from boundary to boundary (or from one vertex back to it) that leave a
 /// disk; a bag with a small mouth is slit. A hole that is filled instead makes the curve jump across it. What is not a
 /// manifold cannot be cut. Cost O(n log n).
-CutResult cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
-                      const CutOptions& options = {});
+Result<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
+                            const CutOptions& options = {});
 
 /// Cuts from the boundary to that one of the given vertices that is farthest from it: this slits a long finger open,
 /// which the map would shrink to nothing. False if all of them are on the boundary.

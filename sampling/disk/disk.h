@@ -7,8 +7,8 @@
 #include "sampling/model/edges.h"
 #include "sampling/model/textured_mesh.h"
 
-/// A component on its way to the square: its triangles as faces that may be split, cut apart and filled up. Every face
-/// knows which part of which mesh triangle it is.
+/// A component before it is mapped to the square: its triangles as faces that may be split, cut apart and complemented.
+/// Every face records which part of which mesh triangle it is.
 namespace hilbrush {
 
 /// The part of a mesh triangle that a face covers; faces that only fill a hole have kNoTriangle.
@@ -19,7 +19,7 @@ struct FaceSource {
 
 class Disk {
  public:
-  /// `triangles` rising, as in Component; sides to other triangles are boundary.
+  /// `triangles` in rising order, as in Component; sides to other triangles are boundary.
   Disk(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<std::uint32_t>& triangles);
 
   const std::vector<Triangle>& faces() const { return faces_; }
@@ -36,11 +36,11 @@ class Disk {
 
   /// Puts a vertex on an edge, at a share of side `s`, which then ends there. Returns the new vertex.
   std::uint32_t split_edge(TriangleSide s, double share = .5);
-  /// Takes the given edges apart (call finish_cuts() after the last).
+  /// Separates the two faces at an edge (call finish_cuts() after the last).
   void cut_edge(TriangleSide s);
   /// Gives each fan that the cuts have made a vertex of its own.
   void finish_cuts();
-  /// Closes a boundary loop by a fan of faces without mass; one of two sides is closed by itself.
+  /// Closes a boundary loop by a fan of faces without mass; the two sides of a loop of two are joined.
   void fill(const BoundaryLoop& loop);
 
  private:

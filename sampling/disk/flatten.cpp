@@ -115,9 +115,9 @@ class Flattening {
     const bool has_holes = component.boundary_loops > 1;
     for (int attempt = 0; attempt < (has_holes ? 2 : 1); ++attempt) {
       if (attempt == 1) options.max_holes = 0;
-      auto [cut, reason] = cut_to_disk(mesh_, neighbors_, component, options);
+      auto cut = cut_to_disk(mesh_, neighbors_, component, options);
       if (!cut) {
-        result_.reason = std::move(reason);
+        result_.reason = cut.reason();
         return false;
       }
       const auto map = map_to_square(*cut);

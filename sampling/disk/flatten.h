@@ -38,11 +38,11 @@ struct FlatComponent {
   }
 };
 
-/// The corners of the box around some triangles, on the surface: the nearest vertices. z is as low as can be.
+/// The vertices nearest to the lower four corners of the box around some triangles.
 std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh, const std::vector<std::uint32_t>& triangles);
 
 /// `area_share` of the whole mesh's surface decides how much the component may be refined. Deterministic, may be called
-/// from several threads. Cost as cut_to_disk and map_to_square; a component that resists, a few times that.
+/// from several threads. Cost as cut_to_disk and map_to_square; a few times that for a component that must be divided.
 FlatComponent flatten(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                       double area_share);
 

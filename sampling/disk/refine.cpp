@@ -11,14 +11,15 @@ namespace {
 
 /// Rounding makes angles of rectangles sum to a little more than 180 degrees.
 constexpr double kMinExcess = 1e-6;
-/// No edge is split nearer to its ends, nor if it is shorter than this share of a mean face's side.
-constexpr double kNearestToEnd = .05;
-constexpr double kShortestSplit = .01;
+/// No edge is split nearer to its ends than this share of it ...
+constexpr double kMinToEnd = .05;
+/// ... nor if it is shorter than this share of a mean face's side.
+constexpr double kMinSplitLength = .01;
 /// Sine over cosine of an angle that counts as 180 degrees.
 constexpr double kMinSine = 1e-6;
-/// Nothing less urgent than this share of the whole area is split: it changes the map too little.
+/// In units of the whole area. A less urgent edge is not split: it changes the map too little.
 constexpr double kMinUrgency = 1e-4;
-/// Worse weights than this are all as urgent, so that length decides between needles.
+/// Weights worse than this count as this, so that length decides between needles.
 constexpr double kMaxDeficit = 10;
 
 /// A queue of the sides whose `urgency` is above 0, most urgent first.
@@ -103,7 +104,7 @@ double foot_of_blunter(const Disk& disk, TriangleSide s) {
     const Apex there(disk, across);
     if (there.cosine * here.sine < here.cosine * there.sine) share = 1 - there.foot;
   }
-  return std::clamp(share, kNearestToEnd, 1 - kNearestToEnd);
+  return std::clamp(share, kMinToEnd, 1 - kMinToEnd);
 }
 
 double mean_side(const Disk& disk) {
@@ -119,11 +120,11 @@ void refine(Disk& disk, std::size_t face_count) {
       disk, face_count, [&](TriangleSide s) { return disk.length(s); }, [](TriangleSide) { return .5; });
 }
 
-void split_towards_delaunay(Disk& disk, std::size_t most_faces) {
-  const double side = mean_side(disk), shortest = kShortestSplit * side;
+void split_towards_delaunay(Disk& disk, std::size_t max_faces) {
+  const double side = mean_side(disk), shortest = kMinSplitLength * side;
   const double least = kMinUrgency * side * side * static_cast<double>(disk.faces().size());
   split_most_urgent(
-      disk, most_faces,
+      disk, max_faces,
       [&](TriangleSide s) {
         const double energy = disk.length(s) > shortest ? negative_energy(disk, s) : 0;
         return energy > least ? energy : 0;

@@ -15,15 +15,15 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Strips are mapped onto at most so many squares in a row.
+/// Strips are mapped onto at most this many squares in a row.
 constexpr double kMaxSquares = 64;
 /// A map that lengthens the curve by more is made again with a sliding boundary.
-constexpr double kGoodLengthening = 1.007;
-/// So many parts that the map shrinks to nothing are slit open, one after the other.
+constexpr double kMaxLengthening = 1.007;
+/// At most this many parts that the map shrinks to nothing are slit open, one after the other.
 constexpr int kMaxExtensions = 6;
-/// Each of them must leave at most this share of the flipped faces.
-constexpr double kGoodProgress = .8;
-/// The general solver that mean values need is slow.
+/// Each slit must leave at most this share of the flipped faces.
+constexpr double kMaxFlippedLeft = .8;
+/// The general solver that mean values need is too slow beyond this.
 constexpr std::size_t kMaxFacesForMeanValues = 20'000;
 
 bool is_flipped(const Triangle& f, const std::vector<Vector2d>& places) {
@@ -89,7 +89,7 @@ SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const 
 /// An inner edge between two vertices on one side of the square would be mapped onto that side, with all that it cuts
 /// off.
 void split_chords(Disk& disk, SquareBoundary& boundary) {
-  // The faces that splitting adds are looked at in their turn: they take over sides of the old ones.
+  // The loop also visits the faces that splitting adds: they take over sides of the old ones.
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s) {
       const TriangleSide side{f, s};
@@ -154,7 +154,7 @@ std::vector<Vector2d> places_of(const Eigen::MatrixXd& values, double width, boo
   return places;
 }
 
-/// The maps that can be made of one cut, and the best of those that are valid.
+/// The maps that can be made of one cut disk, and the best of those that are valid.
 struct MapTrial {
   std::optional<SquareMap> best;
   std::vector<std::uint32_t> flipped;  ///< vertices of the flipped faces of the last map that had any
@@ -204,7 +204,7 @@ struct MapTrial {
       boundary_places_.row(static_cast<Eigen::Index>(v)) = boundary_.places[v];
   }
 
-  /// Width over height of the rectangle that the map would like to fill.
+  /// Width over height of the rectangle that suits the map best.
   double modulus_of(const Eigen::MatrixXd& values) const {
     return std::sqrt(energy(graph_, values.col(1)) / energy(graph_, values.col(0)));
   }
@@ -244,13 +244,13 @@ std::optional<SquareMap> map_to_square(CutDisk& cut) {
     if (cut.outer.size() < 4) return std::nullopt;
     MapTrial trial(cut);
     trial.fix_boundary();
-    if (trial.best && trial.best->lengthening <= kGoodLengthening) return trial.best;
+    if (trial.best && trial.best->lengthening <= kMaxLengthening) return trial.best;
     trial.fit_corners();
     trial.slide_boundary();
     if (trial.best) return trial.best;
-    // Where places differ in their last digits only, the map has shrunk a part to nothing.
+    // Flipped faces: there the map has shrunk a part to nothing, and its places differ in their last digits only.
     const bool is_better = trial.flipped.size() < most_flipped;
-    most_flipped = static_cast<std::size_t>(kGoodProgress * static_cast<double>(trial.flipped.size()));
+    most_flipped = static_cast<std::size_t>(kMaxFlippedLeft * static_cast<double>(trial.flipped.size()));
     if (is_better && extensions < kMaxExtensions && extend_cut(cut, trial.flipped)) continue;
     if (cut.disk.faces().size() <= kMaxFacesForMeanValues) trial.use_mean_values();
     return trial.best;

@@ -50,7 +50,7 @@ char* put_dot(char* at, const Dot& dot, std::uint8_t reason) {
 DotsFile::DotsFile(const std::filesystem::path& file, double pitch_m, std::uint64_t dot_count,
                    std::span<const std::string> reason_names)
     : file_(file), out_(file, std::ios::binary | std::ios::trunc), missing_(dot_count) {
-  if (!out_) throw InputError(file.string(), "can't be opened for writing");
+  if (!out_) throw InputError(file.string(), "cannot be opened for writing");
   const std::string text = header(pitch_m, dot_count, reason_names);
   out_.write(text.data(), static_cast<std::streamsize>(text.size()));
 }
@@ -71,7 +71,7 @@ void DotsFile::add(std::span<const Dot> dots, std::span<const std::uint8_t> reas
 void DotsFile::close() {
   CHECK_EQ(missing_, std::uint64_t{0});
   out_.close();
-  if (!out_) throw InputError(file_.string(), "can't be written: is the disk full?");
+  if (!out_) throw InputError(file_.string(), "cannot be written: is the disk full?");
 }
 
 void write_dots(const DotSequence& sequence, std::span<const std::uint8_t> reasons,

@@ -62,7 +62,7 @@ class DotsHeaderReader {
   DotsHeaderReader(std::istream& in, const std::filesystem::path& file) : in_(in), file_(file) {}
 
   DotsHeader read() {
-    if (next_line() != "ply") refuse("is no PLY file");
+    if (next_line() != "ply") refuse("is not a PLY file");
     while (true) {
       std::istringstream words(next_line());
       std::string word;
@@ -134,7 +134,7 @@ class DotsHeaderReader {
 
 DotSequence read_dots(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file.string(), "can't be opened");
+  if (!in) throw InputError(file.string(), "cannot be opened");
   const DotsHeader header = DotsHeaderReader(in, file).read();
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
@@ -158,7 +158,7 @@ DotSequence read_dots(const std::filesystem::path& file) {
       dot.position_O[k] = value(position[static_cast<std::size_t>(k)], 0);
       dot.normal_O[k] = static_cast<float>(value(normal[static_cast<std::size_t>(k)], 0));
     }
-    if (!dot.position_O.allFinite()) throw InputError(file.string(), "has a dot at no place");
+    if (!dot.position_O.allFinite()) throw InputError(file.string(), "has a dot whose position is not finite");
     dot.smooth_normal_O = dot.normal_O;
     dot.tone = static_cast<float>(value(tone, 0));
     dot.level = static_cast<float>(value(level, 1));

@@ -37,8 +37,8 @@ TEST(SquareMap, HasNoFlippedFaceAndFillsTheSquare) {
     const TexturedMesh mesh = repair_mesh(awkward).mesh;
     const Neighbors neighbors = find_neighbors(mesh.triangles);
     for (const Component& component : find_components(mesh, neighbors)) {
-      auto [cut, reason] = cut_to_disk(mesh, neighbors, component);
-      ASSERT_TRUE(cut) << reason;
+      auto cut = cut_to_disk(mesh, neighbors, component);
+      ASSERT_TRUE(cut) << cut.reason();
       const auto map = map_to_square(*cut);
       ASSERT_TRUE(map);
       EXPECT_EQ(count_flipped(cut->disk, map->places), 0u);
@@ -74,8 +74,8 @@ TEST(SquareMap, KnowsHandlesAndBoundaries) {
 TEST(SquareMap, GivesAStripItsSquaresInARow) {
   const TexturedMesh mesh = test::rectangle(.05, .005, 40, 4);
   const Neighbors neighbors = find_neighbors(mesh.triangles);
-  auto [cut, reason] = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0]);
-  ASSERT_TRUE(cut) << reason;
+  auto cut = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0]);
+  ASSERT_TRUE(cut) << cut.reason();
   const auto map = map_to_square(*cut);
   ASSERT_TRUE(map);
   EXPECT_EQ(map->square_count, 10);
@@ -88,8 +88,8 @@ TEST(SquareMap, IsAllButConformalOnASlitBlob) {
     TexturedMesh mesh = test::sphere(.02, 96, 64);
     for (auto& vertex : mesh.vertices) vertex.z() *= length;
     const Neighbors neighbors = find_neighbors(mesh.triangles);
-    auto [cut, reason] = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0]);
-    ASSERT_TRUE(cut) << reason;
+    auto cut = cut_to_disk(mesh, neighbors, find_components(mesh, neighbors)[0]);
+    ASSERT_TRUE(cut) << cut.reason();
     const auto map = map_to_square(*cut);
     ASSERT_TRUE(map);
     EXPECT_LE(map->lengthening, 1.006) << length << ", squares " << map->square_count;
