@@ -82,10 +82,11 @@ void CellController::check_devices() {
          (laser.fault.empty() ? "" : ": " + laser.fault));
 }
 
+/// Repeated, it does nothing: what is to be cleared is cleared already.
 /// While the executor still comes to rest after a stop, its flag must stay up: the clear waits.
 void CellController::clear(Reply reply) {
-  if (state_ != State::kStopped) refuse("there is no stop to clear");
-  if (waiting_clear_) refuse("it is being cleared already");
+  if (state_ == State::kClearing || waiting_clear_) refuse("it is being cleared already");
+  if (state_ != State::kStopped) return reply.result(status());
   if (thread_.is_busy())
     waiting_clear_ = std::move(reply);
   else
@@ -112,6 +113,7 @@ void CellController::begin_clear(Reply reply) {
 
 void CellController::arm(Reply reply) {
   if (state_ == State::kStopped) refuse("clear the stop first (cell.clear)");
+  if (state_ == State::kArmed) return reply.result(status());  // repeated, it does nothing
   if (state_ != State::kIdle) refuse("it can be armed only when idle");
   state_ = State::kArming;
   thread_.arm(end_of_act(std::move(reply), State::kArmed, "the cell was stopped while it was armed"));

@@ -126,6 +126,7 @@ Job& JobPainting::resume(const std::string& id, bool exposes_in_doubt, bool is_p
 
 Job& JobPainting::pause(const std::string& id) {
   Job& job = queue_.get(id);
+  if (job.state == JobState::kPaused) return job;  // repeated, it does nothing
   if (job.state != JobState::kPainting) forbid(job, "only a job that is being painted can be paused");
   thread_.pause();
   if (leave_approach(ExecutionOutcome::kPaused, "")) return job;

@@ -114,9 +114,10 @@ Json job_result(const Job& job) {
   return {{"job", job_to_json(job)}};
 }
 
-/// A job that is being painted is the executor's; any other is cancelled at once.
+/// A job that is being painted is the executor's; any other is cancelled at once. Repeated, it does nothing.
 Job& cancel_job(const Jobs& jobs, const std::string& id) {
   Job& job = jobs.queue.get(id);
+  if (job.state == JobState::kCancelled) return job;
   if (is_final(job.state)) forbid(job, "there is nothing to cancel");
   if (job.state == JobState::kPainting)
     jobs.painting.cancel(job);
@@ -246,7 +247,7 @@ void MethodTable::add_cell_methods(CellController& controller) {
                       no_params(), cell, [&controller](const Json&, const Caller& caller, Reply reply) {
                         controller.stop("stopped by " + caller.peer.user, std::move(reply));
                       }});
-  methods_.push_back({"cell.clear", "Takes a stop back; nothing moves.", true, no_params(), cell,
+  methods_.push_back({"cell.clear", "Takes a stop back, if there is one; nothing moves.", true, no_params(), cell,
                       [&controller](const Json&, const Caller&, Reply reply) { controller.clear(std::move(reply)); }});
   methods_.push_back({"cell.arm", "Axes ready, laser armed for one job; answered when its start delay is over.", true,
                       no_params(), cell,
