@@ -6,6 +6,7 @@
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -81,6 +82,36 @@ std::string mesh_text(const Json& mesh) {
                      (number_field(mesh, "components") == 1 ? " component" : " components");
   if (has_number(mesh, "area_mm2")) text += ", " + format_count(number_field(mesh, "area_mm2")) + " mm2";
   return text;
+}
+
+/// Three numbers, or nothing.
+std::optional<std::array<double, 3>> vector_field(const Json& object, const char* key) {
+  const Json& value = member(object, key);
+  if (!value.is_array() || value.size() != 3) return std::nullopt;
+  std::array<double, 3> numbers{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!value[i].is_number()) return std::nullopt;
+    numbers[i] = value[i].get<double>();
+  }
+  return numbers;
+}
+
+/// How large the object is and where it stands, from `size_mm`, `min_mm` and `max_mm`: a wrong unit or offset is to be
+/// seen before anything is painted.
+std::string extent_lines(const Json& object) {
+  constexpr int kDigits = 2;
+  std::string text;
+  if (const auto size = vector_field(object, "size_mm"))
+    text += line("size", fixed((*size)[0], kDigits) + " x " + fixed((*size)[1], kDigits) + " x " +
+                             fixed((*size)[2], kDigits) + " mm");
+  const auto min = vector_field(object, "min_mm");
+  const auto max = vector_field(object, "max_mm");
+  if (!min || !max) return text;
+  std::string place;
+  for (std::size_t i = 0; i < 3; ++i)
+    place += std::string(i == 0 ? "" : ", ") + "xyz"[i] + " " + fixed((*min)[i], kDigits) + " to " +
+             fixed((*max)[i], kDigits);
+  return text + line("place", place + " mm from the top of the post");
 }
 
 std::string repairs_text(const Json& repairs) {
@@ -209,6 +240,7 @@ std::string format_report(const Json& report) {
   if (mesh.is_object()) {
     text += line("model", text_field(mesh, "file"));
     if (has_number(mesh, "faces")) text += line("mesh", mesh_text(mesh));
+    text += extent_lines(mesh);
     if (const std::string repairs = repairs_text(member(mesh, "repairs")); !repairs.empty())
       text += line("repaired", repairs);
   }

@@ -97,6 +97,7 @@ struct Workpiece {
     report.mesh.vertices = mesh.vertices.size();
     report.mesh.faces = mesh.triangle_count();
     report.mesh.area_m2 = mesh.area_m2();
+    for (const Eigen::Vector3d& p_O : mesh.vertices) report.mesh.box_O.extend(p_O);
 
     const CellTone cell_tone = job_tone(cell, settings, mesh);
     tone_options = cell_tone.options;

@@ -44,6 +44,10 @@ Json orders_json(const std::vector<ComponentReport>& components) {
   return orders;
 }
 
+Json lengths_json(const Eigen::Vector3d& lengths_m) {
+  return {figure(lengths_m.x() * 1e3), figure(lengths_m.y() * 1e3), figure(lengths_m.z() * 1e3)};
+}
+
 Json mesh_json(const Report::Mesh& mesh) {
   int genus = 0;
   int loops = 0;
@@ -62,6 +66,9 @@ Json mesh_json(const Report::Mesh& mesh) {
           {"genus", is_genus_known ? Json(genus) : Json(nullptr)},
           {"boundary_loops", loops},
           {"area_mm2", figure(mesh.area_m2 * 1e6)},
+          {"size_mm", mesh.box_O.isEmpty() ? Json(nullptr) : lengths_json(mesh.box_O.sizes())},
+          {"min_mm", mesh.box_O.isEmpty() ? Json(nullptr) : lengths_json(mesh.box_O.min())},
+          {"max_mm", mesh.box_O.isEmpty() ? Json(nullptr) : lengths_json(mesh.box_O.max())},
           {"orders", orders_json(mesh.components)},
           {"repairs", repairs},
           {"warnings", mesh.warnings}};

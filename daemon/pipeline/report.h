@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -57,6 +58,7 @@ struct Report {
     std::size_t faces = 0;
     std::vector<ComponentReport> components;
     double area_m2 = 0;
+    Eigen::AlignedBox3d box_O;  ///< m; z = 0 is the top of the post, x = y = 0 its axis
     std::vector<Repair> repairs;
     std::vector<std::string> warnings;
   } mesh;

@@ -72,7 +72,7 @@ void expect_sound_dry_run(const std::string& report_text, const std::filesystem:
     EXPECT_TRUE(report.at(at).is_number()) << pointer << " is " << report.at(at);
   }
   for (const char* pointer : {"/mesh/file", "/mesh/genus", "/mesh/repairs", "/mesh/warnings", "/fidelity/f1_db",
-                              "/fidelity/f2_db", "/version"})
+                              "/fidelity/f2_db", "/version", "/mesh/size_mm", "/mesh/min_mm", "/mesh/max_mm"})
     EXPECT_TRUE(report.contains(Json::json_pointer(pointer))) << pointer << " is missing";
 
   expect_counts_add_up(report.at("dots"));

@@ -62,6 +62,10 @@ TEST(EggCup, IsPaintedWhole) {
   EXPECT_EQ(component.at("pieces"), 1);
   EXPECT_GT(component.at("cut_length_mm"), 60) << "a closed surface is cut from top to bottom";
   EXPECT_GE(component.at("map_shear"), 1);
+  const Json& mesh = report.at("mesh");
+  EXPECT_NEAR(mesh.at("size_mm").at(2).get<double>(), 60, 1e-3) << "its longest side";
+  EXPECT_NEAR(mesh.at("min_mm").at(2).get<double>(), 0, 1e-3) << "it stands on the post";
+  EXPECT_NEAR(mesh.at("min_mm").at(0).get<double>(), -mesh.at("max_mm").at(0).get<double>(), 1e-3) << "centered";
   EXPECT_GE(report.at("dots").at("exposed").get<double>(), .99 * report.at("dots").at("placed").get<double>());
 }
 

@@ -16,6 +16,7 @@ using Json = nlohmann::ordered_json;
 
 const Json kReport = Json::parse(R"({
   "mesh":{"file":"eggcup.wrl","faces":12345,"components":1,"area_mm2":18234.56,
+          "size_mm":[48.14,48.2,60],"min_mm":[-24.07,-24.1,0],"max_mm":[24.07,24.1,60],
           "repairs":[{"what":"vertices welded","count":3},{"what":"degenerate triangles dropped","count":1200}],
           "warnings":["texture a.png is missing"]},
   "dots":{"requested":1000,"placed":1000,"exposed":990,"in_doubt":1,"remaining":2,"skipped":{"occluded":4,"joint_limit":3,"energy":0}},
@@ -45,6 +46,8 @@ TEST(TextOutput, ReportSaysWhatAPersonNeeds) {
       format_report(kReport),
       "  model:         eggcup.wrl\n"
       "  mesh:          12,345 faces in 1 component, 18,235 mm2\n"
+      "  size:          48.14 x 48.20 x 60.00 mm\n"
+      "  place:         x -24.07 to 24.07, y -24.10 to 24.10, z 0.00 to 60.00 mm from the top of the post\n"
       "  repaired:      3 vertices welded, 1,200 degenerate triangles dropped\n"
       "  dots:          1,000 placed, 990 exposed (99.00 %), 7 skipped (4 occluded, 3 joint limit), 2 remaining, 1 in "
       "doubt\n"
