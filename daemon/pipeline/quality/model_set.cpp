@@ -30,9 +30,9 @@ DensitySource source_of(std::size_t density) {
 }
 
 /// All but "fine", which places the dots of a picture, not of a density.
-constexpr std::array kSamplers{Sampler::kCentroid, Sampler::kJittered,     Sampler::kEven,
-                               Sampler::kRandom,   Sampler::kHalton,       Sampler::kHammersley,
-                               Sampler::kSobol,    Sampler::kNiederreiter, Sampler::kBlue};
+constexpr std::array kModelSamplers{Sampler::kCentroid, Sampler::kJittered,     Sampler::kEven,
+                                    Sampler::kRandom,   Sampler::kHalton,       Sampler::kHammersley,
+                                    Sampler::kSobol,    Sampler::kNiederreiter, Sampler::kBlue};
 
 /// The same surface, black all over.
 TexturedMesh blackened(TexturedMesh mesh) {
@@ -54,7 +54,7 @@ class ModelSet : public MeasuredSet {
     kind = "model";
     if (!request.area.empty()) throw InputError("$.area", "is for formulas only: a mesh's areas are exact");
     if (!request.points.empty()) throw InputError("$.points", "is for the plane and the sphere only");
-    options_.sampler = sampler_choice(request.sampler, kSamplers);
+    options_.sampler = sampler_choice(request.sampler, kModelSamplers);
     options_.seed = request.seed;
     if (density_ != kConstant)
       notes.emplace_back(

@@ -13,8 +13,9 @@ namespace {
 using Eigen::Vector2d, Eigen::Vector3d;
 
 /// Those that place dots along a curve on their own; "blue" and "fine" need a mesh.
-constexpr std::array kSamplers{Sampler::kCentroid, Sampler::kJittered,   Sampler::kEven,  Sampler::kRandom,
-                               Sampler::kHalton,   Sampler::kHammersley, Sampler::kSobol, Sampler::kNiederreiter};
+constexpr std::array kParametricSamplers{Sampler::kCentroid, Sampler::kJittered,    Sampler::kEven,
+                                         Sampler::kRandom,   Sampler::kHalton,      Sampler::kHammersley,
+                                         Sampler::kSobol,    Sampler::kNiederreiter};
 
 /// The surface as triangles, `side` by `side` quads.
 TexturedMesh triangles_of(const ParametricSurface& surface, int side) {
@@ -40,7 +41,7 @@ class ParametricSet : public MeasuredSet {
  public:
   ParametricSet(const QualityRequest& request, ParametricShape shape) : shape_(shape), formula_(make_surface(shape)) {
     kind = "surface";
-    options_.sampler = sampler_choice(request.sampler, kSamplers);
+    options_.sampler = sampler_choice(request.sampler, kParametricSamplers);
     options_.curve = curve_choice(request.curve);
     options_.area = choice_in(kAreaMethodNames, request.area, AreaMethod::kFirstFundamentalForm, "$.area");
     options_.density = choice_in(kParametricDensityNames, request.density, ParametricDensity::kConstant, "$.density");
