@@ -83,6 +83,11 @@ Json run(const std::string& command, const Arguments& arguments, const PipelineL
   return {{"via", vias}};
 }
 
+/// Of "file: sentence", the sentence.
+std::string without_file(const std::string& text, const std::string& file) {
+  return !file.empty() && text.starts_with(file + ": ") ? text.substr(file.size() + 2) : text;
+}
+
 int run_and_answer(const std::string& command, const Arguments& arguments) {
   ProgressLines progress;
   const PipelineListener listener{[&progress](const char* stage, double fraction) { progress(stage, fraction); },
@@ -99,7 +104,7 @@ int run_and_answer(const std::string& command, const Arguments& arguments) {
   } catch (const InputError& error) {
     return fail(error.at(), error.sentence(), kBadInput);
   } catch (const ProgramFileError& error) {
-    return fail(arguments.program, error.what(), kBadInput);
+    return fail(arguments.program, without_file(error.what(), arguments.program), kBadInput);
   } catch (const std::bad_alloc&) {
     return fail(arguments.model, "the model needs more memory than there is", kInternal);
   } catch (const std::exception& error) {

@@ -31,8 +31,11 @@ int check_settings(const CommandContext& context, const std::string& file) {
 }
 
 int check_cell(const CommandContext& context, const CheckFlags& flags) {
+  std::error_code error;
+  const bool is_file =
+      std::filesystem::exists(flags.cell_file, error) && !std::filesystem::is_directory(flags.cell_file, error);
   const std::filesystem::path file =
-      flags.cell_file.empty() ? find_cell(flags.cell) : std::filesystem::path(flags.cell_file);
+      is_file ? flags.cell_file : find_cell(flags.cell_file.empty() ? flags.cell : flags.cell_file).string();
   const CellDescription cell = load_cell(file);
   const std::vector<std::string> warnings = cell_warnings(cell);
   if (context.is_json) {
@@ -56,7 +59,7 @@ void add_check_command(CLI::App& app, CommandContext& context) {
   auto flags = std::make_shared<CheckFlags>();
   CLI::App* command =
       add_command(app, context, "check-config", "check a cell file, or the settings of a job, and show what is wrong");
-  auto* file = command->add_option("FILE", flags->cell_file, "a cell file");
+  auto* file = command->add_option("FILE", flags->cell_file, "a cell file, or the name of a cell");
   auto* cell = command->add_option("--cell", flags->cell, "instead: the name of a cell (default: default)");
   auto* settings = command->add_option("--settings", flags->settings_file, "instead: a file with settings of a job");
   file->excludes(cell)->excludes(settings);

@@ -23,8 +23,8 @@ namespace {
 
 constexpr const char* kFooter =
     "Exit codes: 0 done; 1 internal failure; 2 wrong usage; 3 bad input (model, settings, cell, program, job);\n"
-    "4 no daemon answers or the connection was lost; 5 refused in this state; 6 the job failed or was cancelled;\n"
-    "130 interrupted.";
+    "4 no daemon answers or the connection was lost; 5 refused in this state; 6 the job failed or was cancelled, or\n"
+    "none of its dots can be exposed; 130 interrupted.";
 
 std::string default_socket() {
   const char* path = std::getenv("HILBRUSH_SOCKET");

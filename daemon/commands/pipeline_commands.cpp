@@ -74,6 +74,13 @@ void print_files(std::ostream& out, const fs::path& output) {
   }
 }
 
+/// Whether dots were placed, but none can be exposed: the run has done its work, and there is no picture.
+bool is_all_skipped(const Json& report) {
+  const Json& dots = member(report, "dots");
+  return number_field(dots, "placed") > 0 &&
+         number_field(dots, "exposed") + number_field(dots, "remaining") + number_field(dots, "in_doubt") == 0;
+}
+
 int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
   const std::string beside = flags.program.empty() ? std::string() : settings_beside(flags.program);
   const JobSettings settings = job_settings_from_json(flags.settings.to_json(beside, "report.json"));
@@ -92,15 +99,16 @@ int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
     result = run_pipeline_program(find_pipeline_program(), arguments, listener);
   }
 
+  const Json json = Json::parse(result);
+  const int exit_code = is_all_skipped(json) ? kExitJobFailed : kExitOk;
   if (context.is_json) {
     context.terminal.out << result << std::endl;
-    return kExitOk;
+    return exit_code;
   }
-  const Json json = Json::parse(result);
   if (!flags.is_wedge)
     context.terminal.out << (flags.command == "calibrate" ? format_tone_curve(json) : format_report(json));
   print_files(context.terminal.out, flags.output);
-  return kExitOk;
+  return exit_code;
 }
 
 struct DeclaredRun {

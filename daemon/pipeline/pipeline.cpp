@@ -162,6 +162,20 @@ DotSequence sample_dots(Workpiece& piece, Stages& stages) {
   return dots;
 }
 
+/// A picture of which most is missing is probably not what was wanted, and why is in its report only.
+void warn_of_skipped(Report& report, const Stages& stages) {
+  std::uint64_t skipped = 0;
+  for (const SkippedFigures& figures : report.skipped) skipped += figures.count;
+  if (report.dots.placed == 0 || 2 * skipped <= report.dots.placed) return;
+  const std::string placed = std::to_string(report.dots.placed);
+  const std::string begin = skipped == report.dots.placed
+                                ? "none of the " + placed + " dots can be exposed"
+                                : std::to_string(skipped) + " of " + placed + " dots cannot be exposed";
+  const SkippedFigures& main = report.skipped.front();
+  report.mesh.warnings.push_back(begin + "; " + std::to_string(main.count) + " of them: " + main.text);
+  stages.warn(report.mesh.warnings.back());
+}
+
 PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesystem::path& output, Stages& stages) {
   PlannedWork work;
   work.dots = sample_dots(piece, stages);
@@ -180,6 +194,7 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   report.dots.remaining = work.plan.program.exposures.size();
   for (const auto& skipped : work.plan.skipped) ++report.dots.skipped[skip_reason_name(skipped.reason)];
   report.skipped = skipped_figures(work.plan.skipped);
+  warn_of_skipped(report, stages);
   report.advice = advise_mounting(piece.mesh, piece.cell, {mounting_options(piece.settings), piece.up},
                                   plan_options(piece.settings), work.dots, work.plan.skipped, piece.settings.seed);
   report.incidence = incidence_figures(work.plan.program);
@@ -265,6 +280,17 @@ std::string save_report(Workpiece& piece, const Stages& stages, const std::files
   return text;
 }
 
+/// A record that was lost or damaged is the caller's input, no failure of the program.
+std::vector<Emission> read_given_record(const std::filesystem::path& file) {
+  try {
+    return read_emission_record(file);
+  } catch (const std::runtime_error& error) {
+    const std::string text = error.what();
+    const std::string begin = file.string() + ": ";
+    throw InputError(file.string(), text.starts_with(begin) ? text.substr(begin.size()) : text);
+  }
+}
+
 ExposureProgram read_own_program(const Workpiece& piece, const std::filesystem::path& file) {
   ExposureProgram program = read_program(file);
   const std::string mismatch = provenance_mismatch(program.provenance, piece.provenance);
@@ -306,7 +332,7 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
   work.plan.program = read_own_program(piece, program_file);
   const DotCounts planned = dot_counts_from_report(program_file.parent_path() / "report.json");
   piece.report.skipped = skipped_figures_from_report(program_file.parent_path() / "report.json");
-  const auto emissions = read_emission_record(emissions_file);
+  const auto emissions = read_given_record(emissions_file);
 
   // Sampling is deterministic: placing the dots again, instead of reading them, completes the report of the mesh too.
   work.dots = sample_dots(piece, stages);

@@ -228,6 +228,9 @@ void JobPlanning::finish(Job& job, const ChildOutcome& outcome) {
   } catch (const std::exception& error) {
     return fail(job, {"report.json", std::string("the pipeline's report cannot be used: ") + error.what()});
   }
+  // A part would be put on the table for nothing.
+  if (job.placed > 0 && job.exposure_count() == 0)
+    return fail(job, {"", "none of the " + std::to_string(job.placed) + " dots can be exposed"});
   job.state = job.dry_run ? JobState::kDone : JobState::kReady;
   job.progress = job.dry_run ? 1 : 0;
   job.stage.clear();

@@ -107,6 +107,43 @@ TEST(Command, BadInputIsThreeAndSaysWhere) {
   }
 }
 
+TEST(Command, ADamagedProgramOrRecordIsBadInputAndNamedOnce) {
+  const TemporaryFolder folder;
+  const std::string plan = (folder.path() / "plan").string();
+  ASSERT_EQ(hilbrush("plan " + cube() + " --size-mm 20 --dpi 30 -o " + quoted(plan)).exit_code, 0);
+  const std::string record = (folder.path() / "emissions.ply").string();
+  std::ofstream(record) << "not a record";
+  const std::string rest = " -o " + quoted((folder.path() / "out").string());
+  const auto expect_refused = [&](const std::string& program, const std::string& named) {
+    const CommandResult result = hilbrush("develop " + cube() + " --size-mm 20 --dpi 30 --program " + quoted(program) +
+                                          " --emissions " + quoted(record) + rest);
+    EXPECT_EQ(result.exit_code, 3) << result.output;
+    const auto first = result.output.find(named);
+    EXPECT_NE(first, std::string::npos) << result.output;
+    EXPECT_EQ(result.output.find(named, first + 1), std::string::npos) << "named twice:\n" << result.output;
+  };
+  expect_refused(plan + "/program.ply", record);
+  std::ofstream(plan + "/program.ply", std::ios::app) << "more";
+  expect_refused(plan + "/program.ply", plan + "/program.ply");
+}
+
+/// A dark box inside a white one: all dots are out of sight.
+TEST(Command, APictureOfWhichNoDotCanBeExposedIsSixAndSaysWhy) {
+  const TemporaryFolder folder;
+  const auto box = [](double size, double gray) {
+    const std::string g = std::to_string(gray);
+    const std::string s = std::to_string(size);
+    return "Shape { appearance Appearance { material Material { diffuseColor " + g + " " + g + " " + g +
+           " } } geometry Box { size " + s + " " + s + " " + s + " } }\n";
+  };
+  std::ofstream(folder.path() / "hidden.wrl") << "#VRML V2.0 utf8\n" << box(.02, 1) << box(.005, 0);
+  const CommandResult result =
+      hilbrush("plan " + quoted((folder.path() / "hidden.wrl").string()) +
+               " --size-mm 20 --dpi 30 --untextured material -o " + quoted((folder.path() / "out").string()));
+  EXPECT_EQ(result.exit_code, 6) << result.output;
+  EXPECT_NE(result.output.find("warning: none of the "), std::string::npos) << result.output;
+}
+
 TEST(Command, AnUnwritableFolderIsRefused) {
   const TemporaryFolder folder;
   fs::permissions(folder.path(), fs::perms::owner_read | fs::perms::owner_exec);

@@ -149,6 +149,7 @@ TEST(CheckConfig, TheShippedCellIsValid) {
   EXPECT_NE(run.out.find("cell \"default\", valid"), std::string::npos) << run.out;
   const CommandRun as_json = run_command({"check-config", "--json", "--cell", "default"});
   EXPECT_EQ(Json::parse(as_json.out)["cell"], "default");
+  EXPECT_EQ(run_command({"check-config", "default"}).out, run.out) << "by its name, as check-cell takes it";
   EXPECT_EQ(Json::parse(as_json.out)["sha256"], load_cell(find_cell("default")).sha256);
 }
 
@@ -160,6 +161,9 @@ TEST(CheckConfig, ABadCellIsThreeAndNamesThePath) {
   EXPECT_EQ(run.err, "hilbrush: " + file + ": $.axes: missing: expected an object, found the key \"axis\" instead\n");
   EXPECT_EQ(run_command({"check-config", "/none.json"}).exit_code, kExitBadInput);
   EXPECT_EQ(run_command({"check-config", "--cell", "none"}).exit_code, kExitBadInput);
+  const CommandRun unknown = run_command({"check-config", "none"});
+  EXPECT_EQ(unknown.exit_code, kExitBadInput);
+  EXPECT_NE(unknown.err.find("no cell is called \"none\""), std::string::npos) << unknown.err;
 }
 
 TEST(CheckConfig, JobSettingsCanBeCheckedToo) {

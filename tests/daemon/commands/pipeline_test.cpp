@@ -70,6 +70,20 @@ mkdir -p "$folder/out/views"; echo '{}' > "$folder/out/report.json"; echo > "$fo
                 path("out/views") + "\n");
 }
 
+TEST_F(PipelineCommands, ARunThatCanExposeNoDotIsSix) {
+  const auto result_of = [](const std::string& dots) { return "echo '{\"result\":{\"dots\":" + dots + "}}'"; };
+  for (const char* json : {"", "--json"}) {
+    std::vector<std::string> arguments{"plan", model_, "-o", path("out")};
+    if (*json != '\0') arguments.emplace_back(json);
+    use_child(result_of(R"({"placed":10,"exposed":0,"remaining":0,"in_doubt":0,"skipped":{"occluded":10}})"));
+    EXPECT_EQ(run_command(arguments).exit_code, kExitJobFailed) << json;
+    use_child(result_of(R"({"placed":10,"exposed":0,"remaining":1,"in_doubt":0,"skipped":{"occluded":9}})"));
+    EXPECT_EQ(run_command(arguments).exit_code, kExitOk) << "planned, not yet painted " << json;
+    use_child(result_of(R"({"placed":0,"exposed":0,"remaining":0,"in_doubt":0,"skipped":{}})"));
+    EXPECT_EQ(run_command(arguments).exit_code, kExitOk) << "a white object, which is warned of " << json;
+  }
+}
+
 TEST_F(PipelineCommands, ATerminalGetsABarWithTheStage) {
   use_child(std::string("echo '{\"stage\":\"plan\",\"fraction\":0.5}'\n") + kResult);
   const CommandRun run = run_command({"dry-run", model_, "-o", path("out")}, true);

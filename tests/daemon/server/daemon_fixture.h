@@ -76,7 +76,8 @@ class DaemonWorld {
   LineClient client() const { return LineClient(options.socket); }
   /// A model of that name that the script turns into a program of `exposures` exposures, or into the trouble that its
   /// name says: hang, crash, fat, bad, mute, garbage, endless, outside, stray (a program for another model), older (by
-  /// another version), wild (one beyond the limits), lost (no approach), slowway (an endless one), long (the longest
+  /// another version), wild (one beyond the limits), hidden (all dots
+  /// skipped), lost (no approach), slowway (an endless one), long (the longest
   /// pulses).
   std::filesystem::path model(const std::string& name, std::size_t exposures = 100);
   /// Submits and waits until the job is in `state`.

@@ -287,6 +287,20 @@ TEST(ServerJobsTest, CancelWorksInEveryStateThatIsNotFinal) {
   EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "idle");
 }
 
+TEST(ServerJobsTest, AJobOfWhichNoDotCanBeExposedFailsWithASentence) {
+  DaemonWorld world;
+  world.begin();
+  LineClient client = world.client();
+  for (const bool is_dry : {false, true}) {
+    const auto id = world.submit(client, world.model("hidden.wrl"), "failed", is_dry);
+    const Json job = client.result("job.get", named(id)).at("job");
+    EXPECT_NE(job.at("error").at("message").get<std::string>().find("none of the 5 dots can be exposed"),
+              std::string::npos)
+        << job.at("error");
+    EXPECT_EQ(job.at("dots").at("skipped"), 5);
+  }
+}
+
 TEST(ServerJobsTest, JobsSurviveARestart) {
   DaemonWorld world;
   world.options.time_scale = 0.02;
