@@ -30,6 +30,7 @@ struct JobFlags {
   bool dry_run = false;
   SettingsFlags settings;
   bool part_in_place = false;
+  bool accept_warnings = false;
   std::string in_doubt;
   std::string until = "done";
   int copies = 1;
@@ -56,7 +57,18 @@ int submit(const CommandContext& context, const JobFlags& flags) {
   if (!flags.key.empty()) params["key"] = flags.key;
   if (flags.copies != 1) params["copies"] = flags.copies;
   RpcClient client(context.socket_path);
-  return print_job(context, client.call("job.submit", params, kSubmitTimeout), false);
+  const Json result = client.call("job.submit", params, kSubmitTimeout);
+  const Json& job = member(result, "job");
+  if (!context.is_json) {  // of a job that was submitted before with the same key
+    context.terminal.err << format_warnings(job) << std::flush;
+    context.terminal.out << format_plan(job);
+  }
+  print_job(context, result, false);
+  if (const std::string state = text_field(job, "state");
+      !context.is_json && (state == "queued" || state == "planning"))
+    context.terminal.out << "`hilbrush watch " << text_field(job, "id")
+                         << " --until ready` shows what is planned and its warnings" << std::endl;
+  return kExitOk;
 }
 
 int list(const CommandContext& context, const JobFlags& flags) {
@@ -78,22 +90,38 @@ int move(const CommandContext& context, const JobFlags& flags) {
   return print_job(context, client.call("job.move", Json{{"id", flags.id}, {"position", flags.position}}), false);
 }
 
-/// Only the operator can see whether the part is there: a flag, or a question on a terminal.
-bool is_part_in_place(const CommandContext& context, const JobFlags& flags) {
-  if (flags.part_in_place) return true;
+/// On a terminal; elsewhere nothing is asked, and the answer is no.
+bool is_confirmed(const CommandContext& context, const std::string& question) {
   if (!context.terminal.in_is_terminal) return false;
-  context.terminal.err << "Is the part of job " << printable(flags.id) << " in place? [y/N] " << std::flush;
+  context.terminal.err << question << " [y/N] " << std::flush;
   std::string answer;
   std::getline(context.terminal.in, answer);
   return answer == "y" || answer == "Y" || answer == "yes";
 }
 
+/// Only the operator can see whether the part is there: a flag, or a question on a terminal.
+bool is_part_in_place(const CommandContext& context, const JobFlags& flags) {
+  return flags.part_in_place || is_confirmed(context, "Is the part of job " + printable(flags.id) + " in place?");
+}
+
+/// What was planned with warnings, such as a texture that is missing, spoils a part: the operator accepts them first.
+bool are_warnings_accepted(const CommandContext& context, const JobFlags& flags, const Json& job) {
+  const std::string warnings = format_warnings(job);
+  context.terminal.err << warnings << format_plan(job) << std::flush;
+  return warnings.empty() || flags.accept_warnings ||
+         is_confirmed(context, "Paint job " + printable(flags.id) + " in spite of its warnings?");
+}
+
 int start(const CommandContext& context, const JobFlags& flags) {
-  if (!is_part_in_place(context, flags)) {
-    context.terminal.err << "hilbrush: not started: give --part-in-place when the part is on the table\n";
+  const auto refuse = [&context](const char* why) {
+    context.terminal.err << "hilbrush: not started: " << why << '\n';
     return kExitRefused;
-  }
+  };
   RpcClient client(context.socket_path);
+  const Json job = member(client.call("job.get", params_of(flags)), "job");
+  if (!are_warnings_accepted(context, flags, job))
+    return refuse("give --accept-warnings to paint the job in spite of its warnings");
+  if (!is_part_in_place(context, flags)) return refuse("give --part-in-place when the part is on the table");
   return print_job(context, client.call("job.start", Json{{"id", flags.id}, {"part_in_place", true}}), false);
 }
 
@@ -175,6 +203,8 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
   const Declared start_command = declare_with_id(app, context, "start", "start painting a job that is ready", start);
   start_command.app->add_flag("--part-in-place", start_command.flags->part_in_place,
                               "confirms that the part is on the table (without it a terminal asks)");
+  start_command.app->add_flag("--accept-warnings", start_command.flags->accept_warnings,
+                              "paints a job that was planned with warnings (without it a terminal asks)");
   declare_with_id(app, context, "pause", "pause painting after the current dot",
                   [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.pause", false); });
   const Declared resume_command = declare_with_id(app, context, "resume", "continue painting", resume);

@@ -190,6 +190,15 @@ std::string own_time_text(const Json& timing) {
          fixed(number_field(own, "p99", NAN), 2) + " ms";
 }
 
+/// Of skipped dots: "1,234 x tilt past its limit".
+std::string cause_lines(const Json& causes) {
+  std::string text;
+  if (!causes.is_array()) return text;
+  for (const Json& cause : causes)
+    text += line("skipped", format_count(number_field(cause, "count")) + " x " + text_field(cause, "text"));
+  return text;
+}
+
 void add_fields(const Json& object, const std::string& prefix, std::string& text) {
   for (const auto& [key, value] : object.items()) {
     if (value.is_object() && !value.empty())
@@ -245,9 +254,7 @@ std::string format_report(const Json& report) {
       text += line("repaired", repairs);
   }
   if (const Json& dots = member(report, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
-  if (const Json& skipped = member(report, "skipped"); skipped.is_array())
-    for (const Json& group : skipped)
-      text += line("skipped", format_count(number_field(group, "count")) + " x " + text_field(group, "text"));
+  text += cause_lines(member(report, "skipped"));
   if (const Json& suggestion = member(report, "suggestion"); suggestion.is_object())
     text += line("suggestion", text_field(suggestion, "text"));
   if (has_number(report, "pitch_mm")) text += line("pitch", fixed(number_field(report, "pitch_mm"), 3) + " mm");
@@ -300,6 +307,22 @@ std::string format_job_error(const Json& job) {
   return at.empty() ? message : at + ": " + message;
 }
 
+std::string format_plan(const Json& job) {
+  const Json& plan = member(job, "plan");
+  if (!plan.is_object()) return {};
+  std::string text = extent_lines(plan) + cause_lines(member(plan, "skipped"));
+  if (const std::string suggestion = text_field(plan, "suggestion"); !suggestion.empty())
+    text += line("suggestion", suggestion);
+  return text;
+}
+
+std::string format_warnings(const Json& job) {
+  std::string text;
+  if (const Json& warnings = member(job, "warnings"); warnings.is_array())
+    for (const Json& warning : warnings) text += "warning: " + value_text(warning) + "\n";
+  return text;
+}
+
 std::string format_job(const Json& job) {
   std::string text = line("job", id_text(job)) + line("state", text_field(job, "state", "?"));
   text += line("model", text_field(job, "model"));
@@ -308,6 +331,7 @@ std::string format_job(const Json& job) {
                                                     ? ", about " + format_duration(number_field(job, "eta_s")) + " left"
                                                     : ""));
   if (const Json& dots = member(job, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
+  text += format_plan(job);
   if (const double copies = number_field(job, "copies"); copies > 1)
     text += line("copies", format_count(number_field(job, "copies_done")) + " of " + format_count(copies) + " painted");
   if (member(job, "needs_part_in_place") == true) text += line("part", "must be confirmed to be in its place");
@@ -321,9 +345,9 @@ std::string format_job(const Json& job) {
     text += line("settings", settings_text(settings));
   if (const Json& warnings = member(job, "warnings"); warnings.is_array())
     for (const Json& warning : warnings) text += line("warning", value_text(warning));
-  static constexpr std::array kShown{"id",     "state",   "model",    "dry_run", "progress",    "eta_s",
-                                     "dots",   "error",   "warnings", "copies",  "copies_done", "needs_part_in_place",
-                                     "timing", "settings"};
+  static constexpr std::array kShown{"id",     "state",    "model",    "dry_run", "progress",    "eta_s",
+                                     "dots",   "error",    "warnings", "copies",  "copies_done", "needs_part_in_place",
+                                     "timing", "settings", "plan"};
   for (const auto& [key, value] : job.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });

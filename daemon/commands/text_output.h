@@ -21,6 +21,11 @@ std::string format_tone_curve(const nlohmann::ordered_json& curve);
 std::string format_job_line(const nlohmann::ordered_json& job);
 /// "cup.wrl:12: no geometry", or nothing.
 std::string format_job_error(const nlohmann::ordered_json& job);
+/// What is to be seen of a planned job before it is painted: size and place of the object, the causes of skipped dots,
+/// the suggestion. Several lines, or nothing.
+std::string format_plan(const nlohmann::ordered_json& job);
+/// The warnings of a job, each in a line.
+std::string format_warnings(const nlohmann::ordered_json& job);
 /// Everything about one job.
 std::string format_job(const nlohmann::ordered_json& job);
 /// A table, one job a line, under a heading.

@@ -48,6 +48,17 @@ Json next_update(RpcClient& client, InterruptWatch& interrupts) {
   }
 }
 
+/// Once a job is planned, what its operator should see before painting.
+void show_plan(CommandContext& context, ProgressDisplay& display, const Json& job) {
+  display.finish();
+  context.terminal.err << format_warnings(job) << std::flush;
+  context.terminal.out << format_plan(job) << std::flush;
+}
+
+bool is_planned(const std::string& state) {
+  return state != "queued" && state != "planning";
+}
+
 }  // namespace
 
 int watch_job(CommandContext& context, const std::string& id, const std::string& until) {
@@ -56,12 +67,17 @@ int watch_job(CommandContext& context, const std::string& id, const std::string&
   ProgressDisplay display(context.terminal, context.is_json);
   Json update = client.call("job.watch", Json{{"id", id}});
   Json job;
+  bool is_plan_shown = context.is_json;
   while (true) {
     const Json& named = member(member(update, "job"), "id");
     if ((named.is_string() ? named.get<std::string>() : named.dump()) == id) {
       job = member(update, "job");
       const std::string state = text_field(job, "state");
       if (context.is_json) context.terminal.out << update.dump() << std::endl;
+      if (is_planned(state) && !is_plan_shown) {
+        is_plan_shown = true;
+        show_plan(context, display, job);
+      }
       std::string phase = state;
       if (state == "planning") phase.append(", ").append(text_field(job, "stage", "waiting"));
       // In a pipe the line of a stage is printed when the stage begins, so its percentage would always be near 0.

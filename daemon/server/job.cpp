@@ -80,7 +80,8 @@ std::string job_to_record(const Job& job) {
             {"measured", job.measured},
             {"error_at", job.error ? Json(job.error->at) : Json(nullptr)},
             {"error_message", job.error ? Json(job.error->message) : Json(nullptr)},
-            {"warnings", job.warnings}};
+            {"warnings", job.warnings},
+            {"plan", job.plan}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -134,6 +135,7 @@ std::optional<Job> job_from_record(const std::string& text) {
   take("error_at", error.at);
   if (take("error_message", error.message)) job.error = error;
   take("warnings", job.warnings);
+  take("plan", job.plan);
   return job;
 }
 
@@ -153,6 +155,35 @@ Json timing_json(const Job& job) {
 }
 
 }  // namespace
+
+Json plan_of_report(const Json& report) {
+  constexpr std::size_t kCausesMax = 8;
+  constexpr std::size_t kTextMax = 300;  // bytes
+  const auto member = [](const Json& object, const char* key) {
+    const auto found = object.find(key);
+    return object.is_object() && found != object.end() ? *found : Json(nullptr);
+  };
+  const auto text = [&](const Json& object) {
+    const Json value = member(object, "text");
+    return value.is_string() ? Json(value.get<std::string>().substr(0, kTextMax)) : Json(nullptr);
+  };
+  Json plan;
+  const Json mesh = member(report, "mesh");
+  for (const char* key : {"size_mm", "min_mm", "max_mm"}) {
+    const Json value = member(mesh, key);
+    const bool is_vector = value.is_array() && value.size() == 3 &&
+                           std::all_of(value.begin(), value.end(), [](const Json& each) { return each.is_number(); });
+    plan[key] = is_vector ? value : Json(nullptr);
+  }
+  Json causes = Json::array();
+  const Json skipped = member(report, "skipped");
+  for (std::size_t i = 0; skipped.is_array() && i < std::min(skipped.size(), kCausesMax); ++i)
+    if (const Json count = member(skipped[i], "count"); count.is_number())
+      causes.push_back({{"count", count}, {"text", text(skipped[i])}});
+  plan["skipped"] = std::move(causes);
+  plan["suggestion"] = text(member(report, "suggestion"));
+  return plan;
+}
 
 Json job_to_json(const Job& job) {
   const auto listed = std::min(job.in_doubt.size(), kListedInDoubtMax);
@@ -174,6 +205,8 @@ Json job_to_json(const Job& job) {
   json["in_doubt"] =
       std::vector<std::uint32_t>(job.in_doubt.begin(), job.in_doubt.begin() + static_cast<std::ptrdiff_t>(listed));
   json["warnings"] = job.warnings;
+  const Json plan = Json::parse(job.plan, nullptr, false);
+  json["plan"] = plan.is_object() ? plan : Json(nullptr);
   json["model_copy"] = job.model_copy.empty() ? Json(nullptr) : Json(job.model_copy.string());
   const Json settings = Json::parse(job.settings, nullptr, false);
   json["settings"] = settings.is_object() ? settings : Json::object();

@@ -61,6 +61,8 @@ struct Job {
   double planned_s = 0;  ///< the time model's total for the whole program
   std::optional<JobError> error;
   std::vector<std::string> warnings;  ///< of the pipeline, the first kWarningsMax
+  /// What an operator should see before painting, of the report: a JSON object as text, or empty. See plan_of_report().
+  std::string plan;
   std::string model_sha256;           ///< over the copied files, as programs name it
   std::string settings_sha256;
 
@@ -94,6 +96,10 @@ struct Job {
 /// keep their defaults; empty if the text is not a job at all.
 std::string job_to_record(const Job& job);
 std::optional<Job> job_from_record(const std::string& text);
+
+/// The object's size and place, the causes of skipped dots, and the suggestion, of a report of the pipeline: bounded,
+/// whatever the report holds.
+Json plan_of_report(const Json& report);
 
 /// The job object of the protocol. At most 1000 in-doubt dots are listed; dots.in_doubt counts them all.
 Json job_to_json(const Job& job);

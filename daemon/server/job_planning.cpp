@@ -29,6 +29,14 @@ bool is_same_order(const Job& a, const Job& b) {
   return a.model == b.model && a.settings == b.settings && a.dry_run == b.dry_run && a.copies == b.copies;
 }
 
+/// Of its skipped dots, in the words of the plan.
+std::string main_cause(const Job& job) {
+  const Json plan = Json::parse(job.plan, nullptr, false);
+  const Json* causes = plan.is_object() && plan.contains("skipped") ? &plan["skipped"] : nullptr;
+  const bool is_known = causes != nullptr && !causes->empty() && causes->front().at("text").is_string();
+  return is_known ? causes->front().at("text").get<std::string>() : "report.json names the causes";
+}
+
 bool is_unplanned(const Job& job) {
   return job.state == JobState::kQueued || job.state == JobState::kPlanning;
 }
@@ -116,6 +124,7 @@ void JobPlanning::plan_next() {
   job.progress = 0;
   job.error.reset();
   job.warnings.clear();
+  job.plan.clear();
   job.stage = "copy";
   queue_.changed(job);
   std::error_code error;
@@ -223,6 +232,7 @@ void JobPlanning::finish(Job& job, const ChildOutcome& outcome) {
     job.skipped = 0;
     for (const auto& [reason, count] : dots.at("skipped").items()) job.skipped += count.get<std::uint64_t>();
     if (job.skipped + job.exposed > job.placed) throw std::runtime_error("the counts of the report do not add up");
+    job.plan = plan_of_report(report).dump(-1, ' ', false, Json::error_handler_t::replace);
     job.planned_s =
         report.contains("time_s") && report["time_s"].is_object() ? report["time_s"].value("total", 0.) : 0.;
   } catch (const std::exception& error) {
@@ -230,7 +240,7 @@ void JobPlanning::finish(Job& job, const ChildOutcome& outcome) {
   }
   // A part would be put on the table for nothing.
   if (job.placed > 0 && job.exposure_count() == 0)
-    return fail(job, {"", "none of the " + std::to_string(job.placed) + " dots can be exposed"});
+    return fail(job, {"", "none of the " + std::to_string(job.placed) + " dots can be exposed: " + main_cause(job)});
   job.state = job.dry_run ? JobState::kDone : JobState::kReady;
   job.progress = job.dry_run ? 1 : 0;
   job.stage.clear();

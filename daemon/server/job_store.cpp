@@ -10,7 +10,7 @@ namespace hilbrush {
 namespace {
 
 /// Step i brings a database from version i to i + 1. Steps are added, never changed.
-constexpr std::array<const char*, 3> kMigrations{R"(
+constexpr std::array<const char*, 4> kMigrations{R"(
   CREATE TABLE job (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     key TEXT UNIQUE,
@@ -43,14 +43,18 @@ constexpr std::array<const char*, 3> kMigrations{R"(
                                                  // What moves took, as JSON.
                                                  R"(
   ALTER TABLE job ADD COLUMN measured TEXT NOT NULL DEFAULT '';
+)",
+                                                 // What the plan is, for the operator, as JSON.
+                                                 R"(
+  ALTER TABLE job ADD COLUMN plan_summary TEXT NOT NULL DEFAULT '';
 )"};
 
 constexpr const char* kColumns =
     "key, uid, gid, state, model, model_copy, model_sha256, settings, settings_sha256, cell, dry_run, created, placed, "
     "skipped, exposed, planned_s, error_at, error_message, warnings, rank, copies, copies_done, is_begun, started, "
     "ended, "
-    "own_dots, own_median_s, own_p99_s, measured";
-constexpr int kColumnCount = 29;
+    "own_dots, own_median_s, own_p99_s, measured, plan_summary";
+constexpr int kColumnCount = 30;
 
 std::string marks() {
   std::string text = "?";
@@ -122,6 +126,7 @@ void bind(SQLite::Statement& statement, const Job& job) {
   statement.bind(++i, job.own_time.median_s);
   statement.bind(++i, job.own_time.p99_s);
   text(job.measured);
+  text(job.plan);
 }
 
 Job read_job(SQLite::Statement& row) {
@@ -164,6 +169,7 @@ Job read_job(SQLite::Statement& row) {
   job.own_time.median_s = row.getColumn(i++).getDouble();
   job.own_time.p99_s = row.getColumn(i++).getDouble();
   job.measured = text();
+  job.plan = text();
   return job;
 }
 

@@ -72,6 +72,9 @@ Json job_schema() {
         {"properties", {{"at", {{"type", "string"}}}, {"message", {{"type", "string"}}}}}}},
       {"in_doubt", typed("array", "indices of the dots that may have been exposed, at most 1000")},
       {"warnings", typed("array", "sentences of the pipeline")},
+      {"plan", nullable("object",
+                        "once planned: size_mm, min_mm, max_mm of the object as it stands on the post, the causes of "
+                        "skipped dots with count and text, and the suggestion or null")},
       {"model_copy", nullable("string", "the model in the job's folder")},
       {"settings", typed("object", "all settings, defaults filled in")},
       {"created", typed("string", "ISO 8601, UTC")},

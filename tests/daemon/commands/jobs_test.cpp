@@ -57,7 +57,8 @@ TEST(JobCommands, EachSendsItsMethodAndParameters) {
     const auto requests = daemon.requests();
     ASSERT_FALSE(requests.empty());
     EXPECT_EQ(requests.back(), c.request);
-    EXPECT_EQ(requests.size(), c.arguments[0] == "resume" ? 2u : 1u) << "resume asks first whether it must ask";
+    const bool asks_first = c.arguments[0] == "resume" || c.arguments[0] == "start";
+    EXPECT_EQ(requests.size(), asks_first ? 2u : 1u) << "whether it must ask the operator";
   }
 }
 
@@ -114,18 +115,66 @@ TEST(JobCommands, StartAsksOnATerminalAndRefusesInAPipe) {
     const CommandRun run = run_with(daemon, {"start", "7"});
     EXPECT_EQ(run.exit_code, kExitRefused);
     EXPECT_EQ(run.err, "hilbrush: not started: give --part-in-place when the part is on the table\n");
-    EXPECT_TRUE(daemon.requests().empty());
+    EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.get {"id":"7"})"});
   }
   for (const char* no : {"n\n", "\n", "", "yeah\n"}) {
     AnsweringDaemon daemon(kJob);
     EXPECT_EQ(run_with(daemon, {"start", "7"}, no).exit_code, kExitRefused) << no;
-    EXPECT_TRUE(daemon.requests().empty());
+    EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.get {"id":"7"})"});
   }
   AnsweringDaemon daemon(kJob);
   const CommandRun run = run_with(daemon, {"start", "7"}, "y\n");
   EXPECT_EQ(run.exit_code, kExitOk);
   EXPECT_EQ(run.err, "Is the part of job 7 in place? [y/N] ");
-  EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.start {"id":"7","part_in_place":true})"});
+  EXPECT_EQ(daemon.requests().back(), R"(job.start {"id":"7","part_in_place":true})");
+}
+
+constexpr const char* kPlannedJob =
+    R"("result":{"job":{"id":"7","state":"ready","dots":{"placed":2000,"skipped":3},"warnings":["texture a.png is missing"],"plan":{"size_mm":[20,20,60],"min_mm":[-10,-10,0],"max_mm":[10,10,60],"skipped":[{"count":3,"text":"beam blocked"}],"suggestion":"a post of 90 mm would reach more"}}})";
+constexpr const char* kPlanText =
+    "  size:          20.00 x 20.00 x 60.00 mm\n"
+    "  place:         x -10.00 to 10.00, y -10.00 to 10.00, z 0.00 to 60.00 mm from the top of the post\n"
+    "  skipped:       3 x beam blocked\n"
+    "  suggestion:    a post of 90 mm would reach more\n";
+
+TEST(JobCommands, AJobWithWarningsIsStartedOnlyIfTheyAreAccepted) {
+  const std::string seen = std::string("warning: texture a.png is missing\n") + kPlanText;
+  {
+    AnsweringDaemon daemon(kPlannedJob);
+    const CommandRun run = run_with(daemon, {"start", "7", "--part-in-place"});
+    EXPECT_EQ(run.exit_code, kExitRefused);
+    EXPECT_EQ(run.err, seen +
+                           "hilbrush: not started: give --accept-warnings to paint the job in spite of its "
+                           "warnings\n");
+    EXPECT_EQ(daemon.requests().size(), 1u);
+  }
+  {
+    AnsweringDaemon daemon(kPlannedJob);
+    const CommandRun run = run_with(daemon, {"start", "7", "--part-in-place"}, "n\n");
+    EXPECT_EQ(run.exit_code, kExitRefused);
+    EXPECT_TRUE(run.err.starts_with(seen + "Paint job 7 in spite of its warnings? [y/N] ")) << run.err;
+    EXPECT_EQ(daemon.requests().size(), 1u);
+  }
+  AnsweringDaemon asked(kPlannedJob);
+  EXPECT_EQ(run_with(asked, {"start", "7"}, "y\ny\n").exit_code, kExitOk) << "the warnings, then the part";
+  EXPECT_EQ(asked.requests().back(), R"(job.start {"id":"7","part_in_place":true})");
+  AnsweringDaemon accepted(kPlannedJob);
+  EXPECT_EQ(run_with(accepted, {"start", "7", "--part-in-place", "--accept-warnings"}).exit_code, kExitOk);
+  EXPECT_EQ(accepted.requests().back(), R"(job.start {"id":"7","part_in_place":true})");
+}
+
+TEST(JobCommands, GetAndSubmitShowThePlan) {
+  AnsweringDaemon got(kPlannedJob);
+  EXPECT_NE(run_with(got, {"get", "7"}).out.find(kPlanText), std::string::npos);
+  const TemporaryFolder folder;
+  const std::string model = folder.write("cup.wrl", "#VRML V2.0 utf8");
+  AnsweringDaemon known(kPlannedJob);
+  const CommandRun run = run_with(known, {"submit", model, "--key", "k"});
+  EXPECT_TRUE(run.out.starts_with(kPlanText)) << run.out;
+  EXPECT_EQ(run.err, "warning: texture a.png is missing\n");
+  AnsweringDaemon queued(R"("result":{"job":{"id":"7","state":"queued"}})");
+  EXPECT_EQ(run_with(queued, {"submit", model}).out,
+            "job 7: queued\n`hilbrush watch 7 --until ready` shows what is planned and its warnings\n");
 }
 
 TEST(JobCommands, RefusalsBecomeExitCodes) {
@@ -192,6 +241,20 @@ TEST(Watch, APipeGetsLinesUntilTheJobIsDone) {
             "job 7: painting, 11 of 100 dots exposed, 11 %, about 0:00:09 left\n"
             "job 7: done, 100 of 100 dots exposed\n"
             "results are in /jobs/7\n");
+}
+
+TEST(Watch, ShowsThePlanAndItsWarningsOnceWhenItIsMade) {
+  const std::string planned = R"(,"warnings":["w"],"plan":{"size_mm":[1,2,3],"skipped":[],"suggestion":null})";
+  const std::string early = R"(,"stage":"load","warnings":["w"],"plan":null)";
+  const CommandRun run = watch(telling(
+      {job("planning", .5, early), job("ready", 0, planned), job("painting", 0, planned), job("done", 1, planned)}));
+  EXPECT_EQ(run.err, "warning: w\n");
+  EXPECT_EQ(run.out,
+            "job 7: planning, load\n"
+            "  size:          1.00 x 2.00 x 3.00 mm\n"
+            "job 7: ready, 0 of 100 dots exposed\n"
+            "job 7: painting, 0 of 100 dots exposed, 0 %\n"
+            "job 7: done, 100 of 100 dots exposed\n");
 }
 
 TEST(Watch, ATerminalGetsABar) {

@@ -221,9 +221,13 @@ fs::path DaemonWorld::model(const std::string& name, std::size_t exposures) {
     for (auto& exposure : program.exposures) exposure.pulse_s = .05f;
   if (name.starts_with("wild")) program.exposures[exposures / 2].joints[kJ1] = 100;
   write_program(program, folder_ / (name + ".program"));
-  Json report{{"result",
-               {{"dots", {{"placed", exposures + 5}, {"exposed", 0}, {"skipped", {{"occluded", 3}, {"incidence", 2}}}}},
-                {"time_s", {{"total", .04 * static_cast<double>(exposures)}}}}}};
+  Json report{
+      {"result",
+       {{"dots", {{"placed", exposures + 5}, {"exposed", 0}, {"skipped", {{"occluded", 3}, {"incidence", 2}}}}},
+        {"mesh", {{"size_mm", {80, 80, 60}}, {"min_mm", {-40, -40, 0}}, {"max_mm", {40, 40, 60}}}},
+        {"skipped", Json::array({{{"reason", "occluded"}, {"count", 3}, {"text", "beam blocked by the object"}}})},
+        {"suggestion", {{"text", "a post of 90 mm would reach more"}}},
+        {"time_s", {{"total", .04 * static_cast<double>(exposures)}}}}}};
   if (name.starts_with("hidden"))
     report["result"]["dots"] = {{"placed", 5}, {"exposed", 0}, {"skipped", {{"occluded", 5}}}};
   write_file(folder_ / (name + ".report"), report.dump() + "\n");

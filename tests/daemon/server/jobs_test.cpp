@@ -57,6 +57,10 @@ TEST(ServerJobsTest, AJobGoesTheWholeWay) {
   EXPECT_EQ(job.at("dots").at("skipped"), 5);
   EXPECT_EQ(job.at("dots").at("remaining"), 200);
   EXPECT_EQ(job.at("warnings"), Json::array({"a texture is missing"}));
+  EXPECT_EQ(job.at("plan").at("size_mm"), Json::array({80, 80, 60}));
+  EXPECT_EQ(job.at("plan").at("min_mm"), Json::array({-40, -40, 0}));
+  EXPECT_EQ(job.at("plan").at("skipped").at(0).at("text"), "beam blocked by the object");
+  EXPECT_EQ(job.at("plan").at("suggestion"), "a post of 90 mm would reach more");
   EXPECT_TRUE(fs::exists(job.at("model_copy").get<std::string>()));
 
   EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "stopped");
@@ -294,7 +298,7 @@ TEST(ServerJobsTest, AJobOfWhichNoDotCanBeExposedFailsWithASentence) {
   for (const bool is_dry : {false, true}) {
     const auto id = world.submit(client, world.model("hidden.wrl"), "failed", is_dry);
     const Json job = client.result("job.get", named(id)).at("job");
-    EXPECT_NE(job.at("error").at("message").get<std::string>().find("none of the 5 dots can be exposed"),
+    EXPECT_NE(job.at("error").at("message").get<std::string>().find("none of the 5 dots can be exposed: beam blocked"),
               std::string::npos)
         << job.at("error");
     EXPECT_EQ(job.at("dots").at("skipped"), 5);
