@@ -14,7 +14,7 @@ namespace hilbrush {
 
 /// The simulated laser. It times each pulse itself: the pulse's end is fixed when it starts, and only off(), disable(),
 /// the interlock or a fault can bring it forward. off() closes the gate on the next control tick and waits for it; the
-/// interlock cuts at once. It knows nothing of the axes and fires whenever it is told to; the emission record says what
+/// interlock cuts at once. It knows nothing of the axes and fires whenever it is ordered to; the emission record says what
 /// it did while they moved.
 class SimLaser final : public Laser {
  public:

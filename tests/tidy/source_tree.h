@@ -17,7 +17,7 @@ struct SourceFile {
   std::vector<std::string> lines() const;
 };
 
-/// The whole of a file; empty if it can't be read.
+/// The whole of a file; empty if it cannot be read.
 std::string read_text(const std::filesystem::path& file);
 /// Where the project is.
 std::filesystem::path top_folder();

@@ -45,7 +45,7 @@ class Caller {
     EXPECT_EQ(::write(fd_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
     return read(reply_bytes);
   }
-  /// So many bytes, or what came before the other side closed or went silent for 5 s.
+  /// This many bytes, or what came before the other side closed or went silent for 5 s.
   std::string read(std::size_t count) {
     std::string bytes;
     while (bytes.size() < count) {
