@@ -20,9 +20,8 @@ TEST_P(RealSurface, IsMappedAndCoveredOnce) {
   if (!models) GTEST_SKIP() << "HILBRUSH_TEST_MODELS is not set";
   const auto file = std::filesystem::path(models) / GetParam();
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
-  const auto no_image = [](const std::filesystem::path&, std::size_t, std::string& reason) {
-    reason = "not needed";
-    return std::optional<Texture>();
+  const auto no_image = [](const std::filesystem::path&, std::size_t) -> Result<Texture> {
+    return Failure{"not needed"};
   };
   PlacementOptions placement;
   placement.size_m = .08;

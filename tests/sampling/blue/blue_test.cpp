@@ -22,8 +22,8 @@ SampleOptions options_for(std::uint64_t count, Sampler sampler = Sampler::kBlue,
   return options;
 }
 
-struct Surface {
-  explicit Surface(TexturedMesh m) : mesh(std::move(m)), tone(mesh, {}), curve(mesh) {}
+struct PaintedSurface {
+  explicit PaintedSurface(TexturedMesh m) : mesh(std::move(m)), tone(mesh, {}), curve(mesh) {}
   DotSequence place(const SampleOptions& options, SampleReport* report = nullptr) const {
     return place_dots(curve, tone, options, report);
   }
@@ -47,7 +47,7 @@ TexturedMesh fading_picture() {
 }
 
 TEST(Blue, HasBlueNoiseInThePlane) {
-  const Surface square(test::rectangle(1, 1, 2, 2));
+  const PaintedSurface square(test::rectangle(1, 1, 2, 2));
   const std::uint64_t count = 20'000;
   const auto blue = in_plane(square.place(options_for(count))),
              jittered = in_plane(square.place(options_for(count, Sampler::kJittered)));
@@ -63,12 +63,12 @@ TEST(Blue, HasBlueNoiseInThePlane) {
 
 /// One pair in 100,000 that is pushed together by others is still one.
 TEST(Blue, NoPairOfManyIsTooNear) {
-  const Surface square(test::rectangle(1, 1, 2, 2));
+  const PaintedSurface square(test::rectangle(1, 1, 2, 2));
   EXPECT_GE(plane_spacing(in_plane(square.place(options_for(100'000)))).smallest, .55);
 }
 
 TEST(Blue, KeepsDotsApartOnAClosedSurface) {
-  const Surface sphere(test::sphere(.03, 96, 48));
+  const PaintedSurface sphere(test::sphere(.03, 96, 48));
   const DotSequence dots = sphere.place(options_for(8'000));
   const SurfaceQuality quality(sphere.mesh);
   EXPECT_GE(quality.spacing(dots.dots).smallest, .5);
@@ -85,7 +85,7 @@ TEST(Blue, TwoSidesOfAThinPlateDoNotPushEachOther) {
   TexturedMesh upper = test::rectangle(1, 1, 2, 2), lower = upper;
   for (Eigen::Vector3d& p : upper.vertices) p.z() = gap;
   for (auto& triangle : lower.triangles) std::swap(triangle[1], triangle[2]);
-  const Surface plate(test::both(upper, lower));
+  const PaintedSurface plate(test::both(upper, lower));
   const DotSequence dots = plate.place(options_for(8'000));
   const SurfaceQuality quality(plate.mesh);
   EXPECT_GE(quality.spacing(dots.dots).smallest, .45);
@@ -93,7 +93,7 @@ TEST(Blue, TwoSidesOfAThinPlateDoNotPushEachOther) {
 }
 
 TEST(Blue, KeepsDotsApartOverASharpFold) {
-  const Surface sheet(test::folded_sheet(1, .5, 4, 4));
+  const PaintedSurface sheet(test::folded_sheet(1, .5, 4, 4));
   const DotSequence dots = sheet.place(options_for(8'000));
   const SurfaceQuality quality(sheet.mesh);
   EXPECT_GE(quality.spacing(dots.dots).smallest, .45);
@@ -101,7 +101,7 @@ TEST(Blue, KeepsDotsApartOverASharpFold) {
 }
 
 TEST(Blue, FollowsTheTone) {
-  const Surface picture(fading_picture());
+  const PaintedSurface picture(fading_picture());
   const DotSequence dots = picture.place(options_for(6'000));
   ASSERT_EQ(dots.dots.size(), 6'000u);
   const SurfaceQuality quality(picture.mesh, &picture.tone);
@@ -115,7 +115,7 @@ TEST(Blue, FollowsTheTone) {
 }
 
 TEST(Blue, EachDotIsInItsStratum) {
-  const Surface picture(fading_picture());
+  const PaintedSurface picture(fading_picture());
   const std::uint64_t count = 2'000, places = 8;
   const DotSequence dots = picture.place(options_for(count)),
                     even = picture.place(options_for(places * count, Sampler::kEven));
@@ -129,7 +129,7 @@ TEST(Blue, EachDotIsInItsStratum) {
 }
 
 TEST(Blue, SameBytesForAnyNumberOfThreads) {
-  const Surface picture(fading_picture());
+  const PaintedSurface picture(fading_picture());
   std::vector<DotSequence> results;
   for (const std::size_t threads : {1u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -142,7 +142,7 @@ TEST(Blue, SameBytesForAnyNumberOfThreads) {
 }
 
 TEST(Blue, CountsAndReportsAsTheOthersDo) {
-  const Surface picture(fading_picture());
+  const PaintedSurface picture(fading_picture());
   SampleOptions options;
   options.pitch_m = .02;
   SampleReport report, report_of_centroid;
@@ -162,7 +162,7 @@ TEST(Blue, CountsAndReportsAsTheOthersDo) {
 TEST(Blue, NothingToPaintIsNoError) {
   TexturedMesh mesh = test::rectangle(1, 1, 1, 1);
   for (auto& corners : mesh.corner_luminance) corners = {1, 1, 1};
-  const Surface blank(std::move(mesh));
+  const PaintedSurface blank(std::move(mesh));
   SampleOptions options;
   options.sampler = Sampler::kBlue;
   options.pitch_m = .01;
