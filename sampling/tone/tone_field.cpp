@@ -223,9 +223,10 @@ bool ToneField::is_wanted_asked(std::uint32_t triangle) const {
     case Source::kMean:
       return false;
   }
+  if (atlas_) return false;  // and there are no layers
   const bool is_replacing = layers_[sources_[triangle].layer].luminance_factor < 0;
   const auto& l = mesh_.corner_luminance[triangle];
-  return !atlas_ && options_.curve.wanted.empty() && (is_replacing || (l[0] == l[1] && l[1] == l[2]));
+  return options_.curve.wanted.empty() && (is_replacing || (l[0] == l[1] && l[1] == l[2]));
 }
 
 TriangleTone ToneField::on(std::uint32_t triangle) const {
