@@ -92,7 +92,8 @@ TEST_F(KillCampaign, NoDotTwiceNoneLostAtMostOneInDoubtEach) {
     start(*client);
     // What a stop by the guard left in doubt is not the kill's.
     doubts = job(*client).at("dots").at("in_doubt").get<std::size_t>();
-    std::this_thread::sleep_for(std::chrono::duration<double>(kill_after_max_s * (random() % 1000) / 1000.));
+    std::this_thread::sleep_for(
+        std::chrono::duration<double>(kill_after_max_s * static_cast<double>(random() % 1000) / 1000));
     daemon.end(SIGKILL);
   }
   EXPECT_GT(last_done, 0u);
