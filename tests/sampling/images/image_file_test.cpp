@@ -109,6 +109,93 @@ TEST(ImageFile, RefusesTruncatedFiles) {
   }
 }
 
+std::string little_endian(std::uint32_t value, std::size_t count) {
+  std::string out;
+  for (std::size_t i = 0; i < count; ++i) out += static_cast<char>(value >> (8 * i) & 255u);
+  return out;
+}
+
+/// Overwrites the value of a tag in a TIFF of Intel's byte order that has one directory.
+void set_tag(std::string& tiff, std::uint32_t tag, std::uint32_t value) {
+  const auto number = [&](std::size_t at, std::size_t count) {
+    std::uint32_t read = 0;
+    for (std::size_t i = count; i-- > 0;) read = read << 8 | static_cast<unsigned char>(tiff[at + i]);
+    return read;
+  };
+  const std::size_t directory = number(4, 4);
+  for (std::size_t i = 0; i < number(directory, 2); ++i) {
+    const std::size_t entry = directory + 2 + 12 * i;
+    if (number(entry, 2) == tag) tiff.replace(entry + 8, 4, little_endian(value, 4));
+  }
+}
+
+/// 32 x 32 pixels in tiles.
+std::string tiled_tiff(const ModelOnDisk& disk) {
+  const fs::path file = disk.folder() / "tiles.tif";
+  auto output = OIIO::ImageOutput::create(file.string());
+  OIIO::ImageSpec spec(32, 32, 1, OIIO::TypeDesc::UINT8);
+  spec.tile_width = spec.tile_height = 16;
+  spec.attribute("compression", "zip");
+  const std::vector<std::uint8_t> gray(32 * 32, 128);
+  EXPECT_TRUE(output && output->open(file.string(), spec) && output->write_image(OIIO::TypeDesc::UINT8, gray.data()) &&
+              output->close());
+  return bytes_of(file);
+}
+
+TEST(ImageFile, RefusesHugeTilesBeforeItUnpacksOne) {
+  const ModelOnDisk disk;
+  std::string tiff = tiled_tiff(disk);
+  EXPECT_TRUE(load_image_file(disk.folder() / "tiles.tif", 1 << 20));
+  set_tag(tiff, 322, 65520);
+  set_tag(tiff, 323, 65520);
+  const auto texture = load_image_file(disk.write("huge.tif", tiff), 1 << 20);
+  EXPECT_NE(texture.reason().find("its tiles of 65520 x 65520 pixels take 4093 MB each"), std::string::npos)
+      << texture.reason();
+}
+
+TEST(ImageFile, RefusesCompressionsThatUnpackToWhatTheirStreamSays) {
+  const ModelOnDisk disk;
+  std::string tiff = tiled_tiff(disk);
+  set_tag(tiff, 259, 50000);  // Zstandard
+  const auto texture = load_image_file(disk.write("zstd.tif", tiff), 1 << 20);
+  EXPECT_NE(texture.reason().find("its compression (TIFF's number 50000) is not read"), std::string::npos)
+      << texture.reason();
+}
+
+TEST(ImageFile, BelievesNoHeaderThatUnpacksAtOpening) {
+  const ModelOnDisk disk;
+  const auto refusal = [&](const std::string& name, const std::string& bytes) {
+    return load_image_file(disk.write(name, bytes), 1 << 20).reason();
+  };
+  // Run-length encoded, 40,000 pixels each way: OpenImageIO unpacks it when it opens it.
+  std::string bmp = "BM" + little_endian(2000, 4) + little_endian(0, 4) + little_endian(54 + 1024, 4) +
+                    little_endian(40, 4) + little_endian(40000, 4) + little_endian(40000, 4) + little_endian(1, 2) +
+                    little_endian(8, 2) + little_endian(1, 4);
+  bmp.resize(2000, '\0');
+  EXPECT_NE(refusal("rle.bmp", bmp).find("it has 40000 x 40000 pixels"), std::string::npos) << refusal("rle.bmp", bmp);
+  const std::string upside_down = bmp.substr(0, 22) + little_endian(static_cast<std::uint32_t>(-40000), 4);
+  EXPECT_NE(refusal("rle.bmp", upside_down + bmp.substr(26)).find("it has 40000 x 40000 pixels"), std::string::npos);
+  // A canvas of 2 x 2 with a frame of 65,535 x 65,535.
+  const std::string gif = "GIF89a" + little_endian(2, 2) + little_endian(2, 2) + std::string("\x80\0\0", 3) +
+                          std::string(6, '\0') + std::string("\x21\xfe\2hi\0", 6) + "," + little_endian(0, 4) +
+                          little_endian(65535, 2) + little_endian(65535, 2) + std::string("\0\2\0;", 4);
+  EXPECT_NE(refusal("frame.gif", gif).find("it has 65535 x 65535 pixels"), std::string::npos);
+  std::string tga =
+      std::string("\0\0\12\0\0\0\0\0\0\0\0\0", 12) + little_endian(65535, 2) + little_endian(65535, 2) + "\x18\x20";
+  EXPECT_NE(refusal("rle.tga", tga).find("it has 65535 x 65535 pixels"), std::string::npos);
+}
+
+TEST(ImageFile, RefusesAProgressiveJpegWithScansBeyondNumber) {
+  const ModelOnDisk disk;
+  std::string jpeg = bytes_of(save(disk, "a.jpg", 3, 2, 3, kPixels));
+  const std::size_t scan = jpeg.find("\xff\xda");
+  std::string scans;
+  for (int i = 0; i < 1000; ++i) scans += std::string("\xff\xda\0\x08\1\1\0\0\x3f\0", 10);
+  EXPECT_TRUE(load_image_file(disk.folder() / "a.jpg", 6));
+  const auto texture = load_image_file(disk.write("scans.jpg", jpeg.insert(scan, scans)), 6);
+  EXPECT_NE(texture.reason().find("in 1001 scans"), std::string::npos) << texture.reason();
+}
+
 TEST(ImageFile, WritesPngThatItReadsBack) {
   const ModelOnDisk disk;
   const fs::path file = disk.folder() / "out.png";

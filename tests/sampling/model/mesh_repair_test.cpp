@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "sampling/base/input_error.h"
@@ -98,6 +99,67 @@ TEST(MeshRepair, OrientsClosedPartsOutwardsAndOpenOnesByMajority) {
           (repaired.mesh.corner_uv[t][static_cast<std::size_t>(c)] * .05 - repaired.mesh.corner(t, c).head<2>()).norm(),
           0, 1e-12);
   }
+}
+
+/// A sphere without the triangles whose middle `is_hole` says is in a hole, inside out.
+TexturedMesh inside_out_sphere(const std::function<bool(const Eigen::Vector3d&)>& is_hole) {
+  TexturedMesh mesh = test::sphere(.02);
+  std::vector<Triangle> kept;
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
+    const Eigen::Vector3d middle = (mesh.corner(t, 0) + mesh.corner(t, 1) + mesh.corner(t, 2)) / 3;
+    const auto& [a, b, c] = mesh.triangles[t];
+    if (!is_hole(middle / .02)) kept.push_back({a, c, b});
+  }
+  mesh.triangles = std::move(kept);
+  mesh.corner_uv.clear();
+  mesh.corner_luminance.clear();
+  mesh.material_index.clear();
+  return test::finish(std::move(mesh));
+}
+
+constexpr const char* kTurned = "triangles of almost closed parts turned over, which were inside out";
+
+TEST(MeshRepair, TurnsAlmostClosedPartsOutwards) {
+  // Three holes, and the part far from the origin: its volume must not depend on where it stands.
+  TexturedMesh scan = inside_out_sphere([](const Eigen::Vector3d& p) {
+    return p.z() < -.9 || p.x() > .95 || (p - Eigen::Vector3d(0, .8, .6)).norm() < .2;
+  });
+  for (Eigen::Vector3d& p : scan.vertices) p += Eigen::Vector3d(10, -20, 30);
+  const std::size_t count = scan.triangle_count();
+  const RepairedMesh repaired = repair_mesh(std::move(scan));
+  EXPECT_EQ(count_of(repaired, kTurned), count);
+  for (std::size_t t = 0; t < count; ++t)
+    EXPECT_GT(repaired.mesh.area_vector(t).dot(repaired.mesh.corner(t, 0) - Eigen::Vector3d(10, -20, 30)), 0);
+  const RepairedMesh again = repair_mesh(repaired.mesh);
+  EXPECT_EQ(count_of(again, kTurned), 0u) << "what shows its outside stays";
+}
+
+TEST(MeshRepair, LeavesWhatMayShowItsInsideOnPurpose) {
+  const auto is_turned = [](TexturedMesh mesh) { return count_of(repair_mesh(std::move(mesh)), kTurned) > 0; };
+  EXPECT_FALSE(is_turned(inside_out_sphere([](const Eigen::Vector3d& p) { return p.z() > 0; }))) << "a bowl";
+  EXPECT_FALSE(is_turned(inside_out_sphere([](const Eigen::Vector3d& p) { return p.z() > .5; }))) << "a deep bowl";
+  EXPECT_FALSE(is_turned(test::rectangle(.05, .05, 4, 4)));
+  EXPECT_FALSE(is_turned(test::folded_sheet(.05, 1, 4, 4)));
+}
+
+TEST(MeshRepair, WeldsVerticesThatDifferByRounding) {
+  TexturedMesh mesh = test::soup(test::sphere(.02));
+  std::uint64_t state = 1;
+  for (Eigen::Vector3d& p : mesh.vertices)
+    for (int axis = 0; axis < 3; ++axis) {
+      state = state * 6364136223846793005u + 1442695040888963407u;
+      p[axis] += 1e-12 * (static_cast<double>(state >> 40) / (1 << 24) - .5);
+    }
+  const RepairedMesh repaired = repair_mesh(std::move(mesh));
+  EXPECT_EQ(repaired.mesh.vertices.size(), test::sphere(.02).vertices.size());
+  EXPECT_EQ(find_components(repaired.mesh, find_neighbors(repaired.mesh.triangles)).size(), 1u);
+  // The smallest detail that a file in single precision can hold is kept: a step of 1e-7 of the size.
+  TexturedMesh step = test::rectangle(.05, .05, 4, 4);
+  const std::size_t vertices = step.vertices.size();
+  step.vertices.emplace_back(.05, .05, 5e-9);
+  step.triangles.push_back({static_cast<std::uint32_t>(vertices) - 1, static_cast<std::uint32_t>(vertices) - 2,
+                            static_cast<std::uint32_t>(vertices)});
+  EXPECT_EQ(repair_mesh(test::finish(step)).mesh.vertices.size(), vertices + 1);
 }
 
 TEST(MeshRepair, SeparatesSolidsThatOnlyTouch) {

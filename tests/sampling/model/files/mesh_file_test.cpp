@@ -203,6 +203,27 @@ TEST(OffFile, ReadsCommentsCountsOnTheFirstLineAndColors) {
   EXPECT_NE(disk.refusal("m.off", "OFF BINARY\n").find("binary OFF is not read"), std::string::npos);
 }
 
+TEST(OffFile, ReadsFacesAndVerticesThatSpanLines) {
+  const ModelOnDisk disk;
+  const Model model =
+      disk.load("m.off", "OFF\n4 2 0\n0 0\n0\n1 0 0\n0 1 0\n0 0 1\n3 0 1\n  # half of it\n 2 255 0 0\n4\n0 1\n2 3\n");
+  EXPECT_EQ(model.mesh.triangle_count(), 3u);
+  EXPECT_NEAR(model.mesh.corner_luminance[0][0], .2126, 1e-3) << "the color follows the last corner";
+  EXPECT_EQ(disk.refusal("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0\n1 x\n"),
+            "m.off:7: expected the indices of the 3 corners of face 1 of 1, found 'x'");
+}
+
+/// Two points 1e-9 apart at 1e6: nothing of that is left in single precision.
+constexpr double kFar = 1e6;
+constexpr double kNear = 1e6 + 1e-9;
+
+TEST(OffFile, IsReadInDoublePrecision) {
+  const ModelOnDisk disk;
+  const Model model = disk.load("m.off", "OFF\n3 1 0\n1000000 0 0\n1000000.000000001 0 0\n0 1 0\n3 0 1 2\n");
+  EXPECT_EQ(model.mesh.corner(0, 0).x(), kFar);
+  EXPECT_EQ(model.mesh.corner(0, 1).x(), kNear);
+}
+
 std::string binary_stl(std::uint32_t promised, const std::vector<std::array<float, 9>>& triangles) {
   std::string bytes = std::string("solid but binary").append(64, ' ');
   bytes.append(reinterpret_cast<const char*>(&promised), 4);
@@ -231,6 +252,21 @@ TEST(StlFile, ReadsTextAndBinaryThatBeginsLikeText) {
   std::string lie = binary_stl(4'000'000'000u, {triangle});
   lie[0] = 'S', lie[1] = '!';
   EXPECT_NE(disk.refusal("m.stl", lie).find("promises 4000000000 triangles, the file holds 1"), std::string::npos);
+}
+
+TEST(StlFile, IsReadInDoublePrecisionWhereItIsText) {
+  const ModelOnDisk disk;
+  const Model model = disk.load("m.stl",
+                                "solid\nfacet normal 0 0 1\nouter loop\nvertex 1000000 0 0\nvertex 1000000.000000001 "
+                                "0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+  EXPECT_EQ(model.mesh.corner(0, 0).x(), kFar);
+  EXPECT_EQ(model.mesh.corner(0, 1).x(), kNear);
+}
+
+TEST(StlFile, GivesEqualCornersOnePoint) {
+  const ModelOnDisk disk;
+  const Model model = disk.load("m.stl", binary_stl(2, {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {1, 0, 0, -0.f, 0, 0, 0, 0, 1}}));
+  EXPECT_EQ(model.mesh.vertices.size(), 4u);
 }
 
 }  // namespace
