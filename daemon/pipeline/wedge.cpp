@@ -3,11 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
 #include <sstream>
+#include <utility>
 
 #include "config/json_reader.h"
 #include "sampling/base/input_error.h"
+#include "sampling/base/text.h"
+#include "sampling/tone/levels.h"
 
 namespace hilbrush {
 namespace {
@@ -47,17 +53,71 @@ double coverage_of(const JsonObject& json, double reflectance, const CellDescrip
   return std::clamp(coverage, 0., 1.);
 }
 
-WedgeStep read_step(JsonObject& json, const CellDescription& cell) {
+/// A step as it stands in the form.
+struct Reading {
   WedgeStep step;
+  std::optional<std::uint64_t> row, column;  ///< of the field on the card
+};
+
+Reading read_step(JsonObject& json, const CellDescription& cell) {
+  Reading reading;
+  WedgeStep& step = reading.step;
   step.asked = json.number("asked", {0, cell.paint.asked_max});
-  json.optional_integer("row", 1, kMaxSteps);  // to find the field on the card
-  json.optional_integer("column", 1, kMaxSteps);
+  reading.row = json.optional_integer("row", 1, kMaxSteps);
+  reading.column = json.optional_integer("column", 1, kMaxSteps);
   const auto painted = json.optional_number("painted", {0, 1});
   const auto reflectance = json.optional_number("reflectance", {0, 1});
   if (painted && reflectance) json.refuse("reflectance", "contradicts painted: give one of the two");
   if (!painted && !reflectance) json.refuse("painted", "has no reading yet: measure the field and fill it in");
   step.painted = painted ? *painted : coverage_of(json, *reflectance, cell.paint);
-  return step;
+  return reading;
+}
+
+std::string field_name(const Reading& reading) {
+  if (!reading.row || !reading.column) return "the field asked for " + number(reading.step.asked, 4);
+  return "row " + std::to_string(*reading.row) + ", column " + std::to_string(*reading.column);
+}
+
+/// The card of wedge_card() has all its fields, each once. Steps without row and column are of another card.
+void refuse_missing_fields(const JsonObject& json, const std::vector<Reading>& readings) {
+  std::map<std::pair<std::uint64_t, std::uint64_t>, int> times;
+  for (const Reading& reading : readings)
+    if (reading.row && reading.column) ++times[{*reading.row, *reading.column}];
+  if (times.empty()) return;
+  for (std::uint64_t row = 1; row <= WedgeCard::kRows; ++row)
+    for (std::uint64_t column = 1; column <= WedgeCard::kColumns; ++column)
+      if (const int count = times[{row, column}]; count != 1)
+        json.refuse("steps", "the field in row " + std::to_string(row) + ", column " + std::to_string(column) +
+                                 (count == 0 ? " is missing" : " stands there twice") +
+                                 ": a curve needs each field of the card once");
+}
+
+/// More paint was asked of each field than of the one before, among those of the same energy: a reading that falls is
+/// wrong, or the one before it is. What is read of a saturated paint scatters by less than kNoise.
+void refuse_falling_readings(const JsonObject& json, std::vector<Reading> readings, std::span<const double> levels) {
+  constexpr double kNoise = .02;
+  std::stable_sort(readings.begin(), readings.end(),
+                   [](const Reading& a, const Reading& b) { return a.step.asked < b.step.asked; });
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    const WedgeStep& before = readings[i - 1].step;
+    const WedgeStep& step = readings[i].step;
+    if (level_for(levels, before.asked) != level_for(levels, step.asked)) continue;  // fewer, stronger dots cover less
+    if (step.painted < before.painted - kNoise)
+      json.refuse("steps", field_name(readings[i]) + " reads " + number(step.painted, 3) + ", but " +
+                               field_name(readings[i - 1]) + ", which was asked for less, reads " +
+                               number(before.painted, 3) + ": one of them is wrong; measure both again");
+  }
+}
+
+void refuse_equal_readings(const JsonObject& json, const std::vector<Reading>& readings) {
+  constexpr double kMinRange = .1;  // of coverage, from the lightest field to the darkest
+  if (readings.size() < 2) return;
+  const auto [least, most] =
+      std::minmax_element(readings.begin(), readings.end(),
+                          [](const Reading& a, const Reading& b) { return a.step.painted < b.step.painted; });
+  if (most->step.painted - least->step.painted < kMinRange)
+    json.refuse("steps", "all fields read nearly the same, " + number(least->step.painted, 3) + " to " +
+                             number(most->step.painted, 3) + ": was each of them measured?");
 }
 
 void refuse_other_placement(JsonObject& json, const JobSettings& settings) {
@@ -126,6 +186,16 @@ JobSettings wedge_settings(const JobSettings& settings) {
   return wedge;
 }
 
+/// In the form itself, because that is what the person with the densitometer has at hand.
+constexpr const char* kHowToMeasure =
+    "Measure the middle of each field: row 1, column 1 is beside the black corner. painted is the part of the field "
+    "that "
+    "the paint covers, 0 (as the bare white) to 1 (as the black corner): (white - field) / (white - black), each a "
+    "reflectance in linear light. Or give reflectance (0 to 1) instead of painted; the cell file's paint then says "
+    "what "
+    "white and black are. asked is what was asked for: leave it.";
+constexpr std::size_t kMaxHowToMeasure = 1000;  // bytes
+
 std::string wedge_form(const WedgeCard& card, const JobSettings& settings) {
   Json steps = Json::array();
   for (std::size_t i = 0; i < card.asked.size(); ++i)
@@ -133,7 +203,8 @@ std::string wedge_form(const WedgeCard& card, const JobSettings& settings) {
                      {"column", i % WedgeCard::kColumns + 1},
                      {"asked", card.asked[i]},
                      {"painted", nullptr}});
-  const Json form{{"sampler", sampler_name(settings.sampler)},
+  const Json form{{"measure", kHowToMeasure},
+                  {"sampler", sampler_name(settings.sampler)},
                   {"curve", curve_name(settings.curve)},
                   {"levels", settings.levels},
                   {"dpi", settings.dpi.value()},
@@ -143,11 +214,17 @@ std::string wedge_form(const WedgeCard& card, const JobSettings& settings) {
 
 std::vector<WedgeStep> read_wedge_form(const std::filesystem::path& file, const JobSettings& settings,
                                        const CellDescription& cell) {
-  std::vector<WedgeStep> steps;
+  std::vector<Reading> readings;
   read_json_object(read_text_file(file.string(), kMaxFormBytes), file.string(), [&](JsonObject& json) {
+    json.optional_text("measure", kMaxHowToMeasure);
     refuse_other_placement(json, settings);
-    json.objects("steps", kMaxSteps, [&](JsonObject& step) { steps.push_back(read_step(step, cell)); });
+    json.objects("steps", kMaxSteps, [&](JsonObject& step) { readings.push_back(read_step(step, cell)); });
+    refuse_missing_fields(json, readings);
+    refuse_equal_readings(json, readings);
+    refuse_falling_readings(json, readings, energy_levels(settings.levels, cell.paint.asked_max));
   });
+  std::vector<WedgeStep> steps;
+  for (const Reading& reading : readings) steps.push_back(reading.step);
   return steps;
 }
 

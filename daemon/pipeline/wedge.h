@@ -39,13 +39,14 @@ std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& pai
 /// The job that paints it: `settings` with a linear tone curve and without everything that corrects the tone.
 JobSettings wedge_settings(const JobSettings& settings);
 
-/// The form to fill in: for each field its asked coverage, and `painted` still null.
+/// The form to fill in: how to measure, and for each field its asked coverage, and `painted` still null.
 std::string wedge_form(const WedgeCard& card, const JobSettings& settings);
 
 /// Reads a form that was filled in: each step has `asked` and either `painted` (coverage, 0 to 1) or `reflectance`
 /// (linear light; the cell's paint gives the reflectance of white and black).
-/// @throws InputError with the JSON path for unknown keys, for steps without a reading, and for a wedge that was
-/// painted with other settings of placement than `settings`.
+/// @throws InputError with the JSON path for unknown keys, for steps without a reading, for a field that is missing,
+/// for readings that fall where more was asked for, or that are all the same, and for a wedge that was painted with
+/// other settings of placement than `settings`.
 std::vector<WedgeStep> read_wedge_form(const std::filesystem::path& file, const JobSettings& settings,
                                        const CellDescription& cell);
 

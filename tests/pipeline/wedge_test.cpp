@@ -62,11 +62,11 @@ TEST_F(WedgeForm, ReflectancesAreReadByThePaint) {
   fill_in();
   cell_.paint.reflectance_white = .8;
   cell_.paint.reflectance_black = .1;
-  form_["steps"][3].erase("painted");
-  form_["steps"][3]["reflectance"] = .45;
-  EXPECT_NEAR(read_wedge_form(write("form.json", form_.dump()), settings_, cell_)[3].painted, .5, 1e-12);
-  form_["steps"][3]["reflectance"] = .95;
-  EXPECT_NE(error_of(form_).find("$.steps[3].reflectance: is lighter than the paint's"), std::string::npos);
+  form_["steps"][4].erase("painted");
+  form_["steps"][4]["reflectance"] = .45;
+  EXPECT_NEAR(read_wedge_form(write("form.json", form_.dump()), settings_, cell_)[4].painted, .5, 1e-12);
+  form_["steps"][4]["reflectance"] = .95;
+  EXPECT_NE(error_of(form_).find("$.steps[4].reflectance: is lighter than the paint's"), std::string::npos);
 }
 
 TEST_F(WedgeForm, MistakesAreRefusedWithTheirPath) {
@@ -85,6 +85,39 @@ TEST_F(WedgeForm, MistakesAreRefusedWithTheirPath) {
   other = form_;
   other["steps"][2]["painted"] = 1.5;
   EXPECT_NE(error_of(other).find("$.steps[2].painted: expected a number from 0 to 1"), std::string::npos);
+}
+
+TEST_F(WedgeForm, SaysWhatToMeasure) {
+  const std::string text = form_["measure"];
+  EXPECT_NE(text.find("painted is the part of the field that the paint covers"), std::string::npos) << text;
+}
+
+TEST_F(WedgeForm, OneWrongReadingIsRefusedAndNamed) {
+  fill_in();
+  Json wrong = form_;
+  wrong["steps"][6]["painted"] = wrong["steps"][6]["painted"].get<double>() - .2;  // row 2, column 3
+  EXPECT_NE(error_of(wrong).find("$.steps: row 2, column 3 reads"), std::string::npos) << error_of(wrong);
+  wrong = form_;
+  wrong["steps"][6]["painted"] = .99;
+  EXPECT_NE(error_of(wrong).find("but row 2, column 3, which was asked for less, reads 0.99"), std::string::npos)
+      << error_of(wrong);
+  wrong = form_;
+  for (const int i : {14, 15}) wrong["steps"][i]["painted"] = .99 - .001 * i;
+  EXPECT_EQ(error_of(wrong), "accepted") << "a saturated paint, within what readings scatter";
+}
+
+TEST_F(WedgeForm, EqualReadingsAndMissingFieldsAreRefused) {
+  fill_in();
+  Json wrong = form_;
+  for (Json& step : wrong["steps"]) step["painted"] = .5;
+  EXPECT_NE(error_of(wrong).find("$.steps: all fields read nearly the same"), std::string::npos) << error_of(wrong);
+  wrong = form_;
+  wrong["steps"].erase(4);
+  EXPECT_NE(error_of(wrong).find("$.steps: the field in row 2, column 1 is missing"), std::string::npos)
+      << error_of(wrong);
+  wrong = form_;
+  wrong["steps"][5]["column"] = 1;
+  EXPECT_NE(error_of(wrong).find("row 2, column 1 stands there twice"), std::string::npos) << error_of(wrong);
 }
 
 TEST_F(WedgeForm, TheModelAsksForItsSteps) {
