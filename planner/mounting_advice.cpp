@@ -15,8 +15,10 @@ namespace hilbrush {
 namespace {
 
 constexpr std::size_t kSkippedSample = 150, kReachedSample = 150;
-/// A trial must reach this share of the skipped dots, and gain this share of all dots.
-constexpr double kMinHelped = .2, kMinGain = 5e-4;
+/// A trial must reach this share of the skipped dots, and gain this share of all dots: single missing dots are lost in
+/// the picture's own grain, and are not worth another mounting.
+constexpr double kMinHelped = .2;
+constexpr double kMinGain = .005;
 constexpr double kHeightFactors[] = {.5};
 constexpr double kHeightStepsM[] = {.02, .04, .08};
 

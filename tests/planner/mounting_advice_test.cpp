@@ -78,6 +78,38 @@ TEST(MountingAdvice, NothingIsSaidWhereNothingHelps) {
   EXPECT_FALSE(advise_mounting(mesh, cell, {}, {}, dots, for_energy, 1));
 }
 
+/// Five that a higher post would reach, of some thousand: not worth another mounting.
+TEST(MountingAdvice, NothingIsSaidOfAHandfulOfDots) {
+  CellDescription cell = default_cell();
+  cell.fixture.post_height_m = .002;
+  const TexturedMesh mesh = ball(.03);
+  const DotSequence dots = scatter(mesh, 1.5e-3);
+  const Reached now = reached(mesh, cell, dots);
+  const auto advice = advise_mounting(mesh, cell, {}, {}, dots, now.skipped, 1);
+  ASSERT_TRUE(advice && advice->post_height_m);
+  CellDescription higher = cell;
+  higher.fixture.post_height_m = *advice->post_height_m;
+  std::vector<bool> is_skipped(dots.dots.size(), false);
+  std::vector<bool> is_hopeless(dots.dots.size(), false);
+  for (const SkippedDot& dot : now.skipped) is_skipped[dot.dot_index] = true;
+  for (const SkippedDot& dot : reached(mesh, higher, dots).skipped) is_hopeless[dot.dot_index] = true;
+  DotSequence most = dots;
+  most.dots.clear();
+  std::vector<SkippedDot> handful;
+  for (std::uint32_t i = 0; i < dots.dots.size(); ++i) {
+    if (is_skipped[i] && (is_hopeless[i] || handful.size() == 5)) continue;
+    if (is_skipped[i]) {
+      handful.push_back({});
+      handful.back().dot_index = static_cast<std::uint32_t>(most.dots.size());
+      handful.back().reason = SkipReason::kIncidence;
+    }
+    most.dots.push_back(dots.dots[i]);
+  }
+  ASSERT_EQ(handful.size(), 5u);
+  ASSERT_GT(most.dots.size(), 1500u);
+  EXPECT_FALSE(advise_mounting(mesh, cell, {}, {}, most, handful, 1));
+}
+
 TEST(MountingAdvice, SameSeedSameAdvice) {
   CellDescription cell = default_cell();
   cell.fixture.post_height_m = .002;
