@@ -39,6 +39,7 @@ class RemovablePoints {
 
  private:
   static constexpr std::size_t kLeafSize = 8;
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   struct Node {
     std::size_t begin, end, left_over;
     std::size_t child = 0;  ///< the first of two, or 0
@@ -46,7 +47,7 @@ class RemovablePoints {
   };
   struct Best {
     double distance2 = std::numeric_limits<double>::infinity();
-    std::uint32_t point = 0;
+    std::uint32_t point = kNone;
   };
 
   void build(std::size_t begin, std::size_t end) {
@@ -82,13 +83,14 @@ class RemovablePoints {
 
   void search(std::size_t index, const Eigen::Vector3d& to, Best& best) const {
     const Node& node = nodes_[index];
-    if (node.left_over == 0 || distance2_to(node, to) > best.distance2) return;
+    if (node.left_over == 0 || (best.point != kNone && distance2_to(node, to) > best.distance2)) return;
     if (node.child == 0) {
       for (std::size_t i = node.begin; i < node.end; ++i) {
         const std::uint32_t point = order_[i];
         if (!is_gone_.empty() && is_gone_[point]) continue;
         const double distance2 = (points_[point] - to).squaredNorm();
-        if (distance2 < best.distance2 || (distance2 == best.distance2 && point < best.point))
+        // Any point is better than none, also at a distance that is infinite or not a number.
+        if (best.point == kNone || distance2 < best.distance2 || (distance2 == best.distance2 && point < best.point))
           best = {distance2, point};
       }
       return;

@@ -16,6 +16,10 @@ namespace {
 
 /// Sides of an outer boundary are split until none is longer than this share of the whole boundary.
 constexpr double kMaxBoundarySide = 1. / 16;
+/// Halving a side of length l until its parts are short enough takes less than 2 l / (kMaxBoundarySide * whole
+/// boundary) splits, and all sides together this many. More are needed only where rounding keeps halves as long as
+/// their whole: on a boundary of a few last digits of its coordinates.
+constexpr int kMaxBoundarySplits = static_cast<int>(2 / kMaxBoundarySide);
 /// Faces after refine(): of the whole mesh, shared out by area, and of one component at most.
 constexpr double kRefinedMesh = 40'000;
 constexpr double kRefinedComponent = 5000;
@@ -206,20 +210,24 @@ std::vector<Eigen::Vector3d> forks_of(const Disk& disk, const std::vector<Triang
   return forks;
 }
 
-void split_long_sides(CutDisk& cut) {
+/// False if that takes more splits than kMaxBoundarySplits.
+bool split_long_sides(CutDisk& cut) {
   const std::uint32_t start = cut.disk.from(cut.outer[0]);
   const double longest = kMaxBoundarySide * length_of(cut.disk, cut.outer);
+  int splits = 0;
   for (bool is_done = false; !is_done;) {
     is_done = true;
     std::vector<char> is_split(cut.disk.faces().size(), 0);
     for (const TriangleSide s : cut.outer) {
       // Splitting renumbers the other sides of the face, so each face is split once a round.
       if (cut.disk.length(s) <= longest || std::exchange(is_split[s.triangle], 1)) continue;
+      if (++splits > kMaxBoundarySplits) return false;
       cut.disk.split_edge(s);
       is_done = false;
     }
     if (!is_done) cut.outer = loop_from(cut.disk, start);
   }
+  return true;
 }
 
 /// The vertices of a loop that lie at one of the places.
@@ -246,18 +254,18 @@ struct Marks {
   std::optional<TriangleSide> start;
 };
 
-/// Takes the edges apart and finds the outer loop. False if the result has more than one.
-bool open_cuts(CutDisk& cut, const std::vector<TriangleSide>& edges, const Marks& marks) {
+/// Takes the edges apart and finds the outer loop. A text says why it failed.
+std::optional<Failure> open_cuts(CutDisk& cut, const std::vector<TriangleSide>& edges, const Marks& marks) {
   cut.is_cut = cut.is_cut || !edges.empty();
   cut.cut_length_m += length_of(cut.disk, edges);
   for (const TriangleSide side : edges) cut.disk.cut_edge(side);
   cut.disk.finish_cuts();
   std::vector<BoundaryLoop> loops = boundary_loops(cut.disk.neighbors());
-  if (loops.size() != 1) return false;
+  if (loops.size() != 1) return Failure{"no cut was found that makes it a disk"};
   cut.outer = marks.start ? loop_from(cut.disk, cut.disk.from(*marks.start)) : std::move(loops.front());
   cut.forks = vertices_at(cut.disk, cut.outer, marks.forks);
-  split_long_sides(cut);
-  return true;
+  if (!split_long_sides(cut)) return Failure{"it is too small for the precision of its coordinates"};
+  return {};
 }
 
 /// Fills all loops but the longest, if there are more holes than may be cut open.
@@ -295,7 +303,7 @@ Result<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors
     marks.start = edges.back();
   }
   if (!marks.start) marks.forks = forks_of(disk, edges, is_boundary);
-  if (!open_cuts(cut, edges, marks)) return Failure{"no cut was found that makes it a disk"};
+  if (auto failure = open_cuts(cut, edges, marks)) return *std::move(failure);
   if (length_of(disk, cut.outer) < kMinBoundary * std::sqrt(component.area_m2)) {
     std::vector<std::uint32_t> all(disk.positions().size());
     std::iota(all.begin(), all.end(), 0u);
@@ -317,7 +325,10 @@ bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {
     marks.start = path.back();
   else
     marks.forks.push_back(cut.disk.positions()[cut.disk.from(path.back())]);
-  return open_cuts(cut, path, marks);
+  CutDisk extended = cut;
+  if (open_cuts(extended, path, marks)) return false;
+  cut = std::move(extended);
+  return true;
 }
 
 }  // namespace hilbrush

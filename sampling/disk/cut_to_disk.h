@@ -31,12 +31,13 @@ struct CutOptions {
 /// Genus 0 closed: cut along the shortest path between two far ends (an approximate geodesic diameter). Handles and
 /// several boundaries: along the shortest arcs from boundary to boundary (or from one vertex back to it) that leave a
 /// disk; a bag with a small mouth is slit. A hole that is filled instead makes the curve jump across it. What is not a
-/// manifold cannot be cut. Cost O(n log n).
+/// manifold, or as small as the last digits of its coordinates, cannot be cut. Cost O(n log n).
 Result<CutDisk> cut_to_disk(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                             const CutOptions& options = {});
 
 /// Cuts from the boundary to that one of the given vertices that is farthest from it: this slits a long finger open,
-/// which the map would shrink to nothing. False if all of them are on the boundary.
+/// which the map would shrink to nothing. False, and nothing is changed, if all of them are on the boundary or the cut
+/// leaves no disk.
 bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices);
 
 }  // namespace hilbrush

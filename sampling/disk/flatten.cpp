@@ -97,16 +97,20 @@ class Flattening {
  private:
   void add(const Component& component, int divisions) {
     if (add_whole(component)) return;
-    if (component.genus < 0 || divisions == 0 || component.triangles.size() < kMinTrianglesToDivide) {
-      FlatPiece piece;
-      piece.triangles_in_space = component.triangles;
-      piece.corners_O = box_corners(mesh_, component.triangles);
-      result_.pieces.push_back(std::move(piece));
-      return;
-    }
+    if (component.genus < 0 || divisions == 0 || component.triangles.size() < kMinTrianglesToDivide)
+      return add_in_space(component);
+    const auto two_halves = halves(mesh_, neighbors_, component.triangles);
+    // Where all triangles' centers fall onto one point there are no far ends.
+    if (two_halves[0].empty() || two_halves[1].empty()) return add_in_space(component);
     is_divided_ = true;
-    for (const auto& triangles : halves(mesh_, neighbors_, component.triangles))
-      add(describe_component(mesh_, neighbors_, triangles), divisions - 1);
+    for (const auto& triangles : two_halves) add(describe_component(mesh_, neighbors_, triangles), divisions - 1);
+  }
+
+  void add_in_space(const Component& component) {
+    FlatPiece piece;
+    piece.triangles_in_space = component.triangles;
+    piece.corners_O = box_corners(mesh_, component.triangles);
+    result_.pieces.push_back(std::move(piece));
   }
 
   bool add_whole(const Component& component) {

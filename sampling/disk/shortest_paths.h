@@ -28,7 +28,7 @@ std::vector<double> shortest_distances(std::size_t node_count, std::span<const s
     if (distance > distances[node]) continue;
     visit_arcs(node, [&queue, &distances, so_far = distance](std::uint32_t next, double length) {
       const double longer = so_far + length;
-      if (longer >= distances[next]) return false;
+      if (!(longer < distances[next])) return false;  // also of a length that is not a number, which would never end
       distances[next] = longer;
       queue.push({longer, next});
       return true;
