@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr double kFarAway = std::numeric_limits<double>::infinity();
 
 double distance_to(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& point) {
   const auto b = nearest_in_triangle(point, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2));
@@ -28,7 +28,7 @@ TEST(GrowingBall, OnAPlateTrianglesAreAsFarAsTheyLook) {
     const Vector3d center = position(mesh, {start, {.3, .3, .4}});
     ball.begin(center, start);
     for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
-      EXPECT_NEAR(std::sqrt(ball.entry2(t, kFar)), distance_to(mesh, t, center), 1e-12) << start << " to " << t;
+      EXPECT_NEAR(std::sqrt(ball.entry2(t, kFarAway)), distance_to(mesh, t, center), 1e-12) << start << " to " << t;
   }
 }
 
@@ -45,9 +45,9 @@ TEST(GrowingBall, TheOtherSideOfAFoldIsAsFarAsTheFold) {
     ball.begin(center, start);
     for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
       if (position(mesh, {t, {.3, .3, .4}}).z() == 0) continue;
-      EXPECT_GE(std::sqrt(ball.entry2(t, kFar)), center.x() * (1 - 1e-12));
+      EXPECT_GE(std::sqrt(ball.entry2(t, kFarAway)), center.x() * (1 - 1e-12));
       if (distance_to(mesh, t, center) < .9 * center.x()) {
-        EXPECT_LT(std::sqrt(ball.entry2(t, kFar)), 1.1 * center.x());
+        EXPECT_LT(std::sqrt(ball.entry2(t, kFarAway)), 1.1 * center.x());
       }
     }
   }
@@ -62,13 +62,13 @@ TEST(GrowingBall, EndsAtItsLimitAndAtTheComponent) {
   GrowingBall ball(mesh, neighbors);
   ball.begin(mesh.corner(0, 0), 0);
   EXPECT_EQ(ball.entry2(0, 1e-9), 0);
-  EXPECT_EQ(ball.entry2(last, .01 * .01), kFar);
+  EXPECT_EQ(ball.entry2(last, .01 * .01), kFarAway);
   EXPECT_NEAR(ball.entry2(last, 1), std::pow(distance_to(mesh, last, mesh.corner(0, 0)), 2), 1e-15)
       << "it goes on from where it ended";
-  EXPECT_EQ(ball.entry2(above, 1), kFar);
+  EXPECT_EQ(ball.entry2(above, 1), kFarAway);
   ball.begin(mesh.corner(above, 0), above);
   EXPECT_EQ(ball.entry2(above, 1), 0);
-  EXPECT_EQ(ball.entry2(0, 1), kFar) << "nothing is left of the ball before";
+  EXPECT_EQ(ball.entry2(0, 1), kFarAway) << "nothing is left of the ball before";
 }
 
 }  // namespace
