@@ -27,7 +27,7 @@ constexpr const char* kPosix =
 
 const std::vector<FolderRule>& folder_rules() {
   static const std::vector<FolderRule> rules{
-      {"sampling/base", {"sampling/base"}, "Eigen/.*|fmt/.*"},
+      {"sampling/base", {"sampling/base"}, "Eigen/.*|fmt/.*|POSIX"},
       {"sampling/options", {"sampling/options", "sampling/base"}, ""},
       // What meets bytes from outside knows nothing of what is done with a mesh.
       {"sampling/model", {"sampling/model", "sampling/base"}, "Eigen/.*|OpenMesh/.*|zlib\\.h|fmt/.*"},
@@ -41,11 +41,11 @@ const std::vector<FolderRule>& folder_rules() {
       {"planner", {"planner", "sampling/base", "sampling/model", "sampling/dots"}, "Eigen/.*|fmt/.*|tbb/.*|embree3/.*"},
       {"drivers", {"drivers"}, "modbus/.*|modbus\\.h|libserialport\\.h|POSIX"},
       {"sim/script", {"sim/script"}, ""},
-      {"sim/devices", {"sim/devices", "drivers/.", "planner/cell_model", "sampling/base"}, "Eigen/.*|POSIX"},
+      {"sim/devices", {"sim/devices", "drivers/.", "planner/cell_model", "sampling/base"}, "Eigen/.*|fmt/.*|POSIX"},
       // The wires of real devices, with tables of their own: the drivers' codecs are what they test.
       {"sim/wire",
        {"sim/wire", "sim/script", "sim/devices", "drivers/.", "planner/cell_model", "sampling/base"},
-       "POSIX"},
+       "fmt/.*|POSIX"},
       {"sim/film",
        {"sim/film", "sim/devices", "sampling/.", "sampling/base", "sampling/options", "sampling/model", "sampling/dots",
         "sampling/tone", "sampling/predictive", "sampling/images", "planner/cell_model"},

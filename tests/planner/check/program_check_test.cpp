@@ -9,7 +9,6 @@
 
 #include "planner/cell_model/time_model.h"
 #include "planner/reach/kinematics.h"
-#include "planner/reach/transit.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
@@ -109,6 +108,62 @@ TEST_P(SpoiltProgram, IsCaught) {
 
 constexpr std::size_t kVictim = 200;
 
+/// The move whose joints at its middle differ most between two motions, and the joints there in the other one.
+template <class Middle>
+Joints most_apart(const Work& w, const Middle& usual, const Middle& other) {
+  const Kinematics kinematics(w.cell);
+  const auto lens_O = [&](const Joints& joints) {
+    const ToolPose tool = kinematics.tool_pose(joints);
+    return Eigen::Vector3d(tool.focus_O - .5 * (w.cell.lens.near_m + w.cell.lens.far_m) * tool.beam_O);
+  };
+  Joints at{};
+  double most_m = 0;
+  Joints from = home_joints(w.cell);
+  for (std::size_t i = 0; i < w.plan.program.exposures.size(); ++i) {
+    std::vector<Joints> path{from};
+    for (const Via& via : w.plan.program.vias_before(i)) path.push_back(via.joints);
+    path.push_back(w.plan.program.exposures[i].joints);
+    for (std::size_t leg = 1; leg < path.size(); ++leg) {
+      const Joints there = other(path[leg - 1], path[leg]);
+      const double apart_m = (lens_O(there) - lens_O(usual(path[leg - 1], path[leg]))).norm();
+      if (apart_m <= most_m) continue;
+      most_m = apart_m;
+      at = there;
+    }
+    from = path.back();
+  }
+  EXPECT_GT(most_m, .003);
+  return at;
+}
+
+/// The middle of a move by these interpolations, the table late by this.
+std::function<Joints(const Joints&, const Joints&)> middle_of(const CellDescription& cell, Interpolation interpolation,
+                                                              double table_late_s) {
+  return [&cell, interpolation, table_late_s](const Joints& from, const Joints& to) {
+    Joints now = to;
+    const double time_s = .5 * chain_move_s(cell, kRobotChain, interpolation, from, to);
+    put_chain(cell, kRobotChain, interpolation, from, to, time_s, now);
+    put_chain(cell, kTableChain, interpolation, from, to, time_s - table_late_s, now);
+    return now;
+  };
+}
+
+void put_screen_at_lens(Work& w, const Joints& joints) {
+  const ToolPose tool = Kinematics(w.cell).tool_pose(joints);
+  w.add_screen(tool.beam_O, tool.focus_O - .5 * (w.cell.lens.near_m + w.cell.lens.far_m) * tool.beam_O);
+}
+
+void screen_on_the_straight_path(Work& w) {
+  w.cell.motion = {Interpolation::kCoordinated, Interpolation::kCoordinated, 0};
+  put_screen_at_lens(w, most_apart(w, middle_of(w.cell, Interpolation::kIndependent, 0),
+                                   middle_of(w.cell, Interpolation::kCoordinated, 0)));
+}
+
+void screen_on_the_path_of_a_late_table(Work& w) {
+  put_screen_at_lens(w, most_apart(w, middle_of(w.cell, Interpolation::kIndependent, 0),
+                                   middle_of(w.cell, Interpolation::kIndependent, .02)));
+}
+
 const Spoiling kSpoilings[] = {
     {"DotTwice", "more than once", [](Work& w) { w.exposure(kVictim).dot_index = w.exposure(kVictim + 1).dot_index; }},
     {"DotMissing", "neither exposed nor skipped",
@@ -144,7 +199,7 @@ const Spoiling kSpoilings[] = {
     {"PowerNotANumber", "W is outside", [](Work& w) { w.exposure(kVictim).power_w = std::nanf(""); }},
     {"PulseTooLong", "pulse", [](Work& w) { w.exposure(kVictim).pulse_s = .2F; }},
     {"EnergyWrong", "J is not", [](Work& w) { w.exposure(kVictim).energy_j *= 1.1F; }},
-    {"WrongDose", "level asks for",
+    {"WrongDose", "level needs",
      [](Work& w) {
        w.exposure(kVictim).energy_j *= 2;
        w.exposure(kVictim).power_w *= 2;
@@ -190,6 +245,8 @@ const Spoiling kSpoilings[] = {
        const ToolPose tool = Kinematics(w.cell).tool_pose(there);
        w.add_screen(tool.beam_O, tool.focus_O - .5 * (w.cell.lens.near_m + w.cell.lens.far_m) * tool.beam_O);
      }},
+    {"ScreenOnAStraightPath", "on the path there, the lens body touches", &screen_on_the_straight_path},
+    {"ScreenOnThePathOfALateTable", "on the path there, the lens body touches", &screen_on_the_path_of_a_late_table},
     {"RetractsRemoved", "without a retract",
      [](Work& w) {
        // Every re-pose goes straight there.
