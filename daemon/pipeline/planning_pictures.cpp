@@ -8,6 +8,7 @@
 #include <string>
 
 #include "sampling/base/angles.h"
+#include "sampling/base/text.h"
 #include "sampling/quality/plot.h"
 #include "sim/film/canvas.h"
 #include "sim/film/orthographic_view.h"
@@ -78,6 +79,13 @@ class ViewSheet {
     return view_.pixel_of(p_O, tolerance_m_);
   }
 
+  bool shows_back_faces() const {
+    for (int y = 0; y < view_.height(); ++y)
+      for (int x = 0; x < view_.width(); ++x)
+        if (view_.pixel(x, y).side == OrthographicView::Side::kBack) return true;
+    return false;
+  }
+
   void draw_surface(Canvas& canvas, int left, int top) const {
     for (int y = 0; y < view_.height(); ++y)
       for (int x = 0; x < view_.width(); ++x) {
@@ -142,7 +150,7 @@ void write_legend_entry(Canvas& canvas, int& left, int top, const Color& color, 
   left += kText + 2 * kPad + Canvas::text_width(text, kScale);
 }
 
-void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
+void write_legend(Canvas& canvas, Row row, int top, const Plan& plan, bool has_back_faces) {
   int left = kPad;
   if (row == kReach) {
     std::array<std::size_t, kReasonColors.size()> counts{};
@@ -152,6 +160,7 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
       if (counts[r] > 0)
         write_legend_entry(canvas, left, top, kReasonColors[r],
                            std::to_string(counts[r]) + " " + skip_reason_name(static_cast<SkipReason>(r)));
+    if (has_back_faces) write_legend_entry(canvas, left, top, kBackFace, "surface seen from behind");
   } else if (row == kIncidence) {
     for (const int degrees : {0, 10, 20, 30, 40, 45})
       write_legend_entry(canvas, left, top, incidence_color(degrees * kDegree), std::to_string(degrees) + " deg");
@@ -163,22 +172,52 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan) {
   }
 }
 
-/// Curves of the time so far, by what it was spent on.
+/// 3725.4 -> "1:02 h"; less than a minute in seconds.
+std::string hours_text(double seconds) {
+  const auto minutes = static_cast<long long>(std::floor(seconds / 60 + .5));
+  if (minutes < 1) return amount(seconds) + " s";
+  const std::string rest = std::to_string(minutes % 60);
+  return std::to_string(minutes / 60) + ":" + (rest.size() < 2 ? "0" : "") + rest + " h";
+}
+
+struct TimeUnit {
+  const char* name;
+  double seconds;
+};
+
+/// So that the numbers at the axis are short.
+TimeUnit time_unit(double total_s) {
+  constexpr double kMinute = 60;
+  constexpr double kHour = 3600;
+  if (total_s >= 2 * kHour) return {"hours so far", kHour};
+  if (total_s >= 2 * kMinute) return {"minutes so far", kMinute};
+  return {"seconds so far", 1};
+}
+
+}  // namespace
+
 Plot time_plot(const CellDescription& cell, const ExposureProgram& program) {
   constexpr std::size_t kMaxPoints = 400;
   const std::size_t step = std::max<std::size_t>(1, program.exposures.size() / kMaxPoints);
-  std::array<PlotSeries, 5> series{{{"in all", {}}, {"move", {}}, {"settle", {}}, {"expose", {}}, {"retract", {}}}};
+  const TimeSplit total = estimate_time(cell, program);
+  const double total_s = total.total_s();
+  const TimeUnit unit = time_unit(total_s);
+  const auto part = [total_s](const char* name, double seconds) {
+    const auto percent = static_cast<int>(std::lround(100 * seconds / std::max(total_s, 1e-9)));
+    return PlotSeries{std::string(name) + " " + hours_text(seconds) + ", " + std::to_string(percent) + " %", {}};
+  };
+  std::array<PlotSeries, 5> series{PlotSeries{"in all " + hours_text(total_s), {}}, part("move", total.move_s),
+                                   part("settle", total.settle_s), part("expose", total.expose_s),
+                                   part("retract", total.retract_s)};
   estimate_time(cell, program, [&](std::size_t exposure, const TimeSplit& so_far) {
     if (exposure % step != 0 && exposure + 1 != program.exposures.size()) return;
     const auto x = static_cast<double>(exposure + 1);
     const std::array<double, 5> seconds{so_far.total_s(), so_far.move_s, so_far.settle_s, so_far.expose_s,
                                         so_far.retract_s};
-    for (std::size_t k = 0; k < series.size(); ++k) series[k].points.emplace_back(x, seconds[k]);
+    for (std::size_t k = 0; k < series.size(); ++k) series[k].points.emplace_back(x, seconds[k] / unit.seconds);
   });
-  return {"Where the time goes", "exposures", "seconds so far", false, false, 0., {}, {series.begin(), series.end()}};
+  return {"Where the time goes", "exposures", unit.name, false, false, 0., {}, {series.begin(), series.end()}};
 }
-
-}  // namespace
 
 Color skip_reason_color(SkipReason reason) {
   return kReasonColors[static_cast<std::size_t>(reason)];
@@ -197,6 +236,8 @@ Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const 
     width += std::max(views.back().second.width(), Canvas::text_width(longest, kScale)) + kPad;
     height = std::max(height, views.back().second.height());
   }
+  const bool has_back_faces =
+      std::any_of(views.begin(), views.end(), [](const auto& view) { return view.second.shows_back_faces(); });
   constexpr int kMinWidth = 900;  // pixels, so that the legends fit
   const int row_height = 2 * (kText + kPad) + height + kPad;
   Canvas canvas(std::max(width, kMinWidth), kRowCount * row_height + kPad, kBackground);
@@ -218,7 +259,7 @@ Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const 
         drawing.path(view, canvas, x, y);
       left += column + kPad;
     }
-    write_legend(canvas, static_cast<Row>(row), top + kText + kPad + height + kPad, plan);
+    write_legend(canvas, static_cast<Row>(row), top + kText + kPad + height + kPad, plan, has_back_faces);
   }
   return canvas.picture();
 }

@@ -8,6 +8,7 @@
 #include "sampling/dots/dots.h"
 #include "sampling/images/image_file.h"
 #include "sampling/model/textured_mesh.h"
+#include "sampling/quality/plot.h"
 
 /// Pictures of a plan, to look at before it is painted.
 namespace hilbrush {
@@ -19,6 +20,10 @@ Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const 
 
 /// The color of a reason in that picture, sRGB.
 std::array<std::uint8_t, 3> skip_reason_color(SkipReason reason);
+
+/// The time of the program so far over its exposures, in hours, minutes or seconds, and what it is spent on; the legend
+/// says each part as h:mm and as a share of all.
+Plot time_plot(const CellDescription& cell, const ExposureProgram& program);
 
 /// Writes into `folder` planning.png, the picture above, and time.svg: the time of the program, divided by what it is
 /// spent on, over the exposures. Returns the files written. @throws InputError naming a file that cannot be written.

@@ -80,5 +80,21 @@ TEST(PlanningPictures, TimeIsPlottedToItsEnd) {
   EXPECT_DOUBLE_EQ(last.total_s(), total.total_s()) << "the program has no path home";
 }
 
+TEST(PlanningPictures, TimeIsInHoursAndMinutesWithShares) {
+  PlannedPlate plate(0, SkipReason::kOccluded);
+  for (Exposure& exposure : plate.plan.program.exposures) exposure.pulse_s = 30;
+  const CellDescription cell = load_cell(find_cell("default"));
+  const TimeSplit total = estimate_time(cell, plate.plan.program);
+  ASSERT_GT(total.total_s(), 400 * 30);
+  const Plot plot = time_plot(cell, plate.plan.program);
+  EXPECT_EQ(plot.y_label, "hours so far");
+  EXPECT_NEAR(plot.series.at(0).points.back().y(), total.total_s() / 3600, 1e-9);
+  EXPECT_TRUE(plot.series.at(0).name.starts_with("in all 3:2")) << plot.series.at(0).name;
+  EXPECT_EQ(plot.series.at(3).name.substr(0, 14), "expose 3:20 h,") << plot.series.at(3).name;
+  EXPECT_TRUE(plot.series.at(3).name.ends_with(" %"));
+  for (Exposure& exposure : plate.plan.program.exposures) exposure.pulse_s = .001F;
+  EXPECT_NE(time_plot(cell, plate.plan.program).y_label, "hours so far");
+}
+
 }  // namespace
 }  // namespace hilbrush
