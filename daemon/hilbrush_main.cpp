@@ -19,6 +19,7 @@ int terminal_width() {
 /// The operator's command: see daemon/commands/command_line.h.
 int main(int argc, char** argv) {
   hilbrush::Terminal terminal{
-      std::cout, std::cerr, std::cin, isatty(STDOUT_FILENO) == 1, isatty(STDIN_FILENO) == 1, terminal_width()};
+      std::cout,        std::cerr,     std::cin, isatty(STDOUT_FILENO) == 1, isatty(STDIN_FILENO) == 1,
+      terminal_width(), terminal_width};
   return hilbrush::run_hilbrush(std::vector<std::string>(argv + (argc > 0 ? 1 : 0), argv + argc), terminal);
 }

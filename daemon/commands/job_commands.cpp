@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <ostream>
+#include <thread>
 
 #include "daemon/commands/command_context.h"
 #include "daemon/commands/exit_code.h"
@@ -31,6 +32,7 @@ struct JobFlags {
   SettingsFlags settings;
   bool part_in_place = false;
   bool accept_warnings = false;
+  bool yes = false;
   std::string in_doubt;
   std::string until = "done";
   int copies = 1;
@@ -140,9 +142,44 @@ int resume(const CommandContext& context, const JobFlags& flags) {
   return print_job(context, client.call("job.resume", params), false);
 }
 
-int call_with_id(const CommandContext& context, const JobFlags& flags, const std::string& method, bool in_full) {
+int get(const CommandContext& context, const JobFlags& flags) {
   RpcClient client(context.socket_path);
-  return print_job(context, client.call(method, Json{{"id", flags.id}}), in_full);
+  return print_job(context, client.call("job.get", params_of(flags)), true);
+}
+
+/// Painting ends between two dots, a moment after it was asked to: the answer waits for it, so that it is the new
+/// state.
+Json state_after_painting(RpcClient& client, const JobFlags& flags, Json result) {
+  constexpr auto kPatience = std::chrono::seconds(30);  // a retract, a pulse and a settling take less
+  constexpr auto kPause = std::chrono::milliseconds(50);
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (text_field(member(result, "job"), "state") == "painting" && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(kPause);
+    result = client.call("job.get", params_of(flags));
+  }
+  return result;
+}
+
+int pause(const CommandContext& context, const JobFlags& flags) {
+  RpcClient client(context.socket_path);
+  return print_job(context, state_after_painting(client, flags, client.call("job.pause", params_of(flags))), false);
+}
+
+/// Of a part that is painted in part nothing can be saved: a terminal asks first.
+int cancel(const CommandContext& context, const JobFlags& flags) {
+  RpcClient client(context.socket_path);
+  if (!flags.yes && context.terminal.in_is_terminal) {
+    const Json job = member(client.call("job.get", params_of(flags)), "job");
+    const std::string state = text_field(job, "state");
+    const bool is_begun = state == "painting" || state == "paused";
+    const std::string question = format_job_line(job) + "\nCancelling is final: the part cannot be painted on, as it " +
+                                 "can after `hilbrush pause`. Cancel?";
+    if (is_begun && !is_confirmed(context, question)) {
+      context.terminal.err << "hilbrush: not cancelled\n";
+      return kExitRefused;
+    }
+  }
+  return print_job(context, state_after_painting(client, flags, client.call("job.cancel", params_of(flags))), false);
 }
 
 using Action = std::function<int(CommandContext&, const JobFlags&)>;
@@ -185,8 +222,9 @@ void add_watch(CLI::App& app, CommandContext& context) {
                       [](CommandContext& c, const JobFlags& flags) { return watch_job(c, flags.id, flags.until); });
   command.app
       ->add_option("--until", command.flags->until,
-                   "stop watching in this state: planning, ready, painting, paused or done (default)")
-      ->check(CLI::IsMember({"planning", "ready", "painting", "paused", "done"}));
+                   "stop watching in this state: planning, ready, painting, paused or done (default); part: when this "
+                   "part of a job of several copies is painted")
+      ->check(CLI::IsMember({"planning", "ready", "painting", "paused", "part", "done"}));
 }
 
 }  // namespace
@@ -198,15 +236,13 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
                                         [](CommandContext& c, const JobFlags& f) { return list(c, f); });
   list_command.app->add_flag("--queue", list_command.flags->is_queue,
                              "only the waiting jobs, in the order of the queue");
-  declare_with_id(app, context, "get", "show everything about one job",
-                  [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.get", true); });
+  declare_with_id(app, context, "get", "show everything about one job", get);
   const Declared start_command = declare_with_id(app, context, "start", "start painting a job that is ready", start);
   start_command.app->add_flag("--part-in-place", start_command.flags->part_in_place,
                               "confirms that the part is on the table (without it a terminal asks)");
   start_command.app->add_flag("--accept-warnings", start_command.flags->accept_warnings,
                               "paints a job that was planned with warnings (without it a terminal asks)");
-  declare_with_id(app, context, "pause", "pause painting after the current dot",
-                  [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.pause", false); });
+  declare_with_id(app, context, "pause", "pause painting after the current dot", pause);
   const Declared resume_command = declare_with_id(app, context, "resume", "continue painting", resume);
   resume_command.app
       ->add_option("--in-doubt", resume_command.flags->in_doubt,
@@ -219,8 +255,10 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
   move_command.app->add_option("POSITION", move_command.flags->position, "1: the next to be painted")
       ->required()
       ->check(CLI::Range(1, 1'000'000));
-  declare_with_id(app, context, "cancel", "cancel a job; its remaining dots are not painted",
-                  [](CommandContext& c, const JobFlags& flags) { return call_with_id(c, flags, "job.cancel", false); });
+  const Declared cancel_command = declare_with_id(
+      app, context, "cancel", "cancel a job for good; its remaining dots are not painted (see pause)", cancel);
+  cancel_command.app->add_flag("--yes", cancel_command.flags->yes,
+                               "do not ask, even if the job is being painted (without it a terminal asks)");
 }
 
 }  // namespace hilbrush

@@ -14,7 +14,9 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  /// In a pipe a line is printed when `phase` changes and, if `lines_every_tenth`, at every tenth of it.
+  /// If the text does not fit beside the bar, the bar is drawn shorter, then the last of the text's parts, which commas
+  /// separate, are left out. In a pipe a line is printed when `phase` changes and, if `lines_every_tenth`, at every
+  /// tenth of it.
   void show(const std::string& phase, double fraction, const std::string& text, bool lines_every_tenth = false);
   /// A line of its own, above the bar.
   void print_above(const std::string& line);
@@ -26,8 +28,9 @@ class ProgressDisplay {
 
   Terminal& terminal_;
   bool is_quiet_;
-  std::string drawn_;  ///< the bar as it is on the screen
-  std::string phase_;  ///< of the last line printed in a pipe
+  std::string drawn_;      ///< the bar as it is on the screen
+  int drawn_columns_ = 0;  ///< of the terminal when it was drawn
+  std::string phase_;      ///< of the last line printed in a pipe
   int tenth_ = -1;
 };
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <iosfwd>
 #include <string>
 
@@ -12,6 +13,10 @@ struct Terminal {
   bool out_is_terminal = false;  ///< progress bars are drawn; else plain lines
   bool in_is_terminal = false;   ///< questions may be asked
   int width = 80;                ///< columns
+  /// Columns now, for windows that are resized; without it `width`.
+  std::function<int()> measure_width = {};
+
+  int columns() const { return measure_width ? measure_width() : width; }
 };
 
 /// The text with control characters replaced by spaces, so that it cannot control the terminal. For text that comes

@@ -286,17 +286,49 @@ std::string format_tone_curve(const Json& curve) {
   return text;
 }
 
+namespace {
+
+/// ", copy 1 of 2" while a part of a job of several copies is painted or waited for.
+std::string copy_text(const Json& job) {
+  const double copies = number_field(job, "copies");
+  const std::string state = text_field(job, "state");
+  if (copies <= 1 || (state != "ready" && state != "painting" && state != "paused")) return {};
+  return ", copy " + format_count(std::min(number_field(job, "copies_done") + 1, copies)) + " of " +
+         format_count(copies);
+}
+
+}  // namespace
+
 std::string format_job_line(const Json& job) {
   const Json& dots = member(job, "dots");
   const std::string state = text_field(job, "state", "?");
   const std::string stage = text_field(job, "stage");
-  std::string text = "job " + id_text(job) + ": " + state;
+  std::string text = "job " + id_text(job) + ": " + state + copy_text(job);
   if (state == "planning") return text + (stage.empty() ? "" : ", " + stage) + " " + percent_text(job);
   if (const double placed = number_field(dots, "placed"); placed > 0)
     text += ", " + format_count(number_field(dots, "exposed")) + " of " + format_count(placed) + " dots exposed";
   if (state == "painting" || state == "paused") text += ", " + percent_text(job);
   if (has_number(job, "eta_s")) text += ", about " + format_duration(number_field(job, "eta_s")) + " left";
+  if (const std::string why = format_job_error(job); state == "paused" && !why.empty()) text += ": " + why;
   return text;
+}
+
+std::string format_job_brief(const Json& job) {
+  const std::string state = text_field(job, "state", "?");
+  if (state != "painting" && state != "paused") return format_job_line(job);
+  std::string text = "job " + id_text(job) + ": " + state + copy_text(job) + ", " + percent_text(job);
+  if (has_number(job, "eta_s")) text += ", " + format_duration(number_field(job, "eta_s")) + " left";
+  const Json& dots = member(job, "dots");
+  return text + ", " + format_count(number_field(dots, "exposed")) + " of " +
+         format_count(number_field(dots, "placed")) + " dots";
+}
+
+std::string format_job_wait(const Json& job) {
+  const std::string state = text_field(job, "state");
+  const std::string what = state == "ready" ? "start" : state == "paused" ? "resume" : "";
+  if (what.empty()) return {};
+  return "job " + id_text(job) + " waits for `hilbrush " + what + " " + id_text(job) +
+         "`; the cell must be armed (`hilbrush clear`, `hilbrush arm`)";
 }
 
 std::string format_job_error(const Json& job) {
@@ -337,8 +369,12 @@ std::string format_job(const Json& job) {
   if (member(job, "needs_part_in_place") == true) text += line("part", "must be confirmed to be in its place");
   if (const Json& timing = member(job, "timing"); timing.is_object()) {
     text += line("own time", own_time_text(timing));
-    if (const Json& measured = member(timing, "measured"); measured.is_object())
-      text += line("measured", measured.dump());
+    if (const Json& measured = member(timing, "measured"); measured.is_object()) {
+      const bool is_too_little = member(timing, "measured_is_enough") == false;
+      text += line("measured", measured.dump() + (is_too_little ? ", from too few moves for a cell file: " +
+                                                                      value_text(member(timing, "measured_moves"))
+                                                                : ""));
+    }
   }
   if (const std::string error = format_job_error(job); !error.empty()) text += line("error", error);
   if (const Json& settings = member(job, "settings"); settings.is_object())

@@ -19,6 +19,10 @@ std::string format_tone_curve(const nlohmann::ordered_json& curve);
 
 /// One line: state, stage or counts, ETA.
 std::string format_job_line(const nlohmann::ordered_json& job);
+/// The same for beside a progress bar: what matters most comes first.
+std::string format_job_brief(const nlohmann::ordered_json& job);
+/// For a job that waits for its operator, the command that it waits for; or nothing.
+std::string format_job_wait(const nlohmann::ordered_json& job);
 /// "cup.wrl:12: no geometry", or nothing.
 std::string format_job_error(const nlohmann::ordered_json& job);
 /// What is to be seen of a planned job before it is painted: size and place of the object, the causes of skipped dots,

@@ -23,6 +23,13 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kJob =
     R"("result":{"job":{"id":"7","state":"painting","model":"/m.wrl","dry_run":false,"dots":{"placed":2000,"exposed":500,"skipped":0},"progress":0.25,"eta_s":65,"error":null}})";
 
+/// kJob in another state.
+std::string job_in(const std::string& state) {
+  std::string text = kJob;
+  const std::string now = "painting";
+  return text.replace(text.find(now), now.size(), state);
+}
+
 CommandRun run_with(AnsweringDaemon& daemon, std::vector<std::string> arguments, const char* input = nullptr) {
   arguments.insert(arguments.end(), {"--socket", daemon.socket_path()});
   return run_command(arguments, false, input);
@@ -51,7 +58,8 @@ TEST(JobCommands, EachSendsItsMethodAndParameters) {
       {{"info"}, "system.info -"},
   };
   for (const Case& c : cases) {
-    AnsweringDaemon daemon(kJob);
+    const bool ends_painting = c.arguments[0] == "pause" || c.arguments[0] == "cancel";
+    AnsweringDaemon daemon(ends_painting ? job_in("paused") : kJob);
     const CommandRun run = run_with(daemon, c.arguments);
     EXPECT_EQ(run.exit_code, kExitOk) << run.err;
     const auto requests = daemon.requests();
@@ -177,6 +185,47 @@ TEST(JobCommands, GetAndSubmitShowThePlan) {
             "job 7: queued\n`hilbrush watch 7 --until ready` shows what is planned and its warnings\n");
 }
 
+/// A daemon that answers the requests with these jobs, the last one again and again, and keeps what was asked.
+std::function<void(Peer&)> answering_in_turn(std::vector<std::string> states, std::vector<std::string>& methods) {
+  return [states = std::move(states), &methods](Peer& peer) {
+    for (std::string line = peer.read_line(); !line.empty(); line = peer.read_line()) {
+      const Json request = Json::parse(line);
+      const std::size_t turn = std::min(methods.size(), states.size() - 1);
+      methods.push_back(request["method"].get<std::string>());
+      peer.write_line(R"({"jsonrpc":"2.0","id":)" + request["id"].dump() + "," + job_in(states[turn]) + "}");
+    }
+  };
+}
+
+TEST(JobCommands, PauseAndCancelAnswerWithTheNewState) {
+  for (const auto& [command, state] : {std::pair("pause", "paused"), std::pair("cancel", "cancelled")}) {
+    std::vector<std::string> methods;
+    FakeDaemon daemon(answering_in_turn({"painting", "painting", state}, methods));
+    const CommandRun run = run_command({command, "7", "--socket", daemon.socket_path()});
+    daemon.finish();
+    EXPECT_EQ(run.exit_code, kExitOk) << run.err;
+    EXPECT_TRUE(run.out.starts_with(std::string("job 7: ") + state + ", 500 of 2,000 dots exposed")) << run.out;
+    EXPECT_EQ(methods, (std::vector<std::string>{std::string("job.") + command, "job.get", "job.get"}));
+  }
+}
+
+TEST(JobCommands, CancelOfAJobThatIsPaintedAsksOnATerminal) {
+  for (const char* state : {"painting", "paused"}) {
+    AnsweringDaemon daemon(job_in(state));
+    const CommandRun run = run_with(daemon, {"cancel", "7"}, "n\n");
+    EXPECT_EQ(run.exit_code, kExitRefused);
+    EXPECT_NE(run.err.find("Cancelling is final"), std::string::npos) << run.err;
+    EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.get {"id":"7"})"});
+  }
+  AnsweringDaemon agreed(job_in("paused"));
+  EXPECT_EQ(run_with(agreed, {"cancel", "7"}, "y\n").exit_code, kExitOk);
+  EXPECT_EQ(agreed.requests().back(), R"(job.cancel {"id":"7"})");
+  AnsweringDaemon ready(job_in("ready"));
+  EXPECT_EQ(run_with(ready, {"cancel", "7"}, "").err, "") << "nothing is lost that cannot be planned again";
+  AnsweringDaemon forced(job_in("paused"));
+  EXPECT_EQ(run_with(forced, {"cancel", "7", "--yes"}, "").exit_code, kExitOk);
+}
+
 TEST(JobCommands, RefusalsBecomeExitCodes) {
   const std::pair<int, int> codes[] = {{-32700, kExitInternal}, {-32600, kExitInternal}, {-32601, kExitInternal},
                                        {-32602, kExitBadInput}, {-32000, kExitInternal}, {-32001, kExitBadInput},
@@ -253,13 +302,14 @@ TEST(Watch, ShowsThePlanAndItsWarningsOnceWhenItIsMade) {
             "job 7: planning, load\n"
             "  size:          1.00 x 2.00 x 3.00 mm\n"
             "job 7: ready, 0 of 100 dots exposed\n"
+            "job 7 waits for `hilbrush start 7`; the cell must be armed (`hilbrush clear`, `hilbrush arm`)\n"
             "job 7: painting, 0 of 100 dots exposed, 0 %\n"
             "job 7: done, 100 of 100 dots exposed\n");
 }
 
 TEST(Watch, ATerminalGetsABar) {
   const CommandRun run = watch(telling({job("painting", .5), job("done", 1)}), {}, true);
-  EXPECT_TRUE(run.out.starts_with("[############............] job 7: painting, 50 of 100 dots exposed, 50 %\r\033[K"))
+  EXPECT_TRUE(run.out.starts_with("[############............] job 7: painting, 50 %, 50 of 100 dots\r\033[K"))
       << run.out;
   EXPECT_TRUE(run.out.ends_with("\r\033[Kjob 7: done, 100 of 100 dots exposed\n")) << run.out;
 }
@@ -287,6 +337,40 @@ TEST(Watch, UntilEndsAtTheStateOrPastIt) {
   EXPECT_EQ(watch(telling({job("painting", 0), job("paused", .5)}), {"--until", "paused"}).exit_code, kExitOk);
   EXPECT_EQ(watch(telling({job("paused", .5), job("painting", .5)}), {"--until", "painting"}).exit_code, kExitOk);
   EXPECT_EQ(watch(telling({job("failed", 0)}), {"--until", "ready"}).exit_code, kExitJobFailed);
+}
+
+constexpr const char* kFirstOfTwo = R"(,"copies":2,"copies_done":0)";
+constexpr const char* kSecondOfTwo = R"(,"copies":2,"copies_done":1)";
+
+TEST(Watch, UntilCanBeOnePartOfSeveral) {
+  const CommandRun part =
+      watch(telling({job("painting", .5, kFirstOfTwo), job("ready", 0, kSecondOfTwo)}), {"--until", "part"});
+  EXPECT_EQ(part.exit_code, kExitOk) << part.err;
+  EXPECT_NE(part.out.find("job 7: painting, copy 1 of 2, 50 of 100"), std::string::npos) << part.out;
+  EXPECT_TRUE(part.out.ends_with("job 7: ready, copy 2 of 2, 0 of 100 dots exposed\n")) << part.out;
+  EXPECT_EQ(watch(telling({job("ready", 0, kFirstOfTwo), job("painting", 0, kFirstOfTwo), job("done", 1)}),
+                  {"--until", "part"})
+                .out.find("job 7: done"),
+            watch(telling({job("ready", 0, kFirstOfTwo), job("painting", 0, kFirstOfTwo), job("done", 1)}),
+                  {"--until", "done"})
+                .out.find("job 7: done"))
+      << "a first part that has not begun is waited for";
+  const CommandRun ready =
+      watch(telling({job("painting", .5, kFirstOfTwo), job("ready", 0, kSecondOfTwo)}), {"--until", "ready"});
+  EXPECT_NE(ready.out.find("job 7: ready"), std::string::npos) << "it will be ready again: " << ready.out;
+  EXPECT_EQ(watch(telling({job("painting", .5, kSecondOfTwo)}), {"--until", "ready"}).exit_code, kExitOk)
+      << "the last part: never ready again";
+}
+
+TEST(Watch, SaysWhyAJobIsPausedAndWhatItWaitsFor) {
+  const std::string why = R"(,"error":{"at":"cell","message":"the cell was stopped: stopped by anna"})";
+  const std::string line = "job 7: paused, 50 of 100 dots exposed, 50 %: cell: the cell was stopped: stopped by anna\n";
+  const std::string wait =
+      "job 7 waits for `hilbrush resume 7`; the cell must be armed (`hilbrush clear`, `hilbrush arm`)\n";
+  const auto script = telling({job("painting", .5), job("paused", .5, why), job("done", 1)});
+  EXPECT_NE(watch(script).out.find(line + wait), std::string::npos) << watch(script).out;
+  EXPECT_NE(watch(script, {}, true).out.find(line + wait), std::string::npos) << "above the bar";
+  EXPECT_EQ(watch(telling({job("paused", .5, why)}), {"--until", "paused"}).out, line);
 }
 
 TEST(Watch, ALostDaemonIsFour) {

@@ -103,6 +103,16 @@ TEST(TextOutput, JobShowsErrorWarningsAndWhatItDoesNotKnow) {
   EXPECT_EQ(text.find("empty"), std::string::npos) << text;
 }
 
+TEST(TextOutput, MotionFromTooFewMovesIsNotForACellFile) {
+  Json job = Json::parse(R"({"id":"7","state":"done","timing":{"own_ms":{"median":1,"p99":2},
+      "measured":{"move_delay_ms":1,"time_factor":{"j1":1.57}},"measured_moves":{"j1":232},"measured_is_enough":false}})");
+  EXPECT_NE(format_job(job).find("\"j1\":1.57}}, from too few moves for a cell file: {\"j1\":232}\n"),
+            std::string::npos)
+      << format_job(job);
+  job["timing"]["measured_is_enough"] = true;
+  EXPECT_EQ(format_job(job).find("too few"), std::string::npos);
+}
+
 TEST(TextOutput, JobsAreATable) {
   EXPECT_EQ(format_job_table(Json::array()), "no jobs\n");
   EXPECT_EQ(
@@ -197,12 +207,49 @@ TEST(ProgressDisplay, ATerminalGetsABarThatFitsAndGoesAway) {
   EXPECT_EQ(out.str(), "[############............] plan 50 %");
   out.str("");
   display.show("plan", 2, std::string(100, 'x'));
-  EXPECT_EQ(out.str(), "\r\033[K[########################] " + std::string(12, 'x'));
+  EXPECT_EQ(out.str(), "\r\033[K[########] " + std::string(28, 'x'));
   out.str("");
   display.print_above("warning: w");
   EXPECT_EQ(err.str(), "warning: w\n");
   display.finish();
   EXPECT_TRUE(out.str().ends_with("\r\033[K"));
+}
+
+TEST(ProgressDisplay, TheTimeLeftIsNeverCutAtEightyColumns) {
+  const Json job = Json::parse(
+      R"({"id":"12345","state":"painting","copies":1000,"copies_done":99,"progress":0.25,"eta_s":36065,
+          "dots":{"placed":2000000,"exposed":500000}})");
+  std::ostringstream out, err;
+  std::istringstream in;
+  Terminal terminal{out, err, in, true, true, 80};
+  {
+    ProgressDisplay display(terminal, false);
+    display.show("painting", .25, format_job_brief(job));
+    EXPECT_EQ(out.str(), "[####.............] job 12345: painting, copy 100 of 1,000, 25 %, 10:01:05 left");
+    out.str("");
+  }
+  terminal.width = 200;
+  ProgressDisplay wide(terminal, false);
+  out.str("");
+  wide.show("painting", .25, format_job_brief(job));
+  EXPECT_TRUE(out.str().ends_with(" left, 500,000 of 2,000,000 dots")) << out.str();
+}
+
+TEST(ProgressDisplay, AWindowThatIsResizedKeepsOneBar) {
+  std::ostringstream out, err;
+  std::istringstream in;
+  int columns = 80;
+  Terminal terminal{out, err, in, true, true, 80, [&columns] { return columns; }};
+  ProgressDisplay display(terminal, false);
+  display.show("plan", .5, std::string(50, 'x'));  // 77 columns
+  out.str("");
+  columns = 30;  // wrapped into three rows by the terminal
+  display.show("plan", .5, std::string(50, 'x'));
+  EXPECT_EQ(out.str(), "\033[2A\r\033[J[####....] " + std::string(18, 'x'));
+  out.str("");
+  columns = 100;
+  display.show("plan", .5, std::string(50, 'x'));
+  EXPECT_EQ(out.str(), "\r\033[K[############............] " + std::string(50, 'x'));
 }
 
 TEST(ProgressDisplay, QuietShowsNothing) {
