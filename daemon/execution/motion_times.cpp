@@ -15,6 +15,12 @@ constexpr double kVarietyLeast = .01;
 
 }  // namespace
 
+bool MeasuredMotion::is_enough() const {
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (time_factor[i] && moves[i] < kMovesEnough) return false;
+  return true;
+}
+
 void MotionTimes::add(const CellDescription& cell, const Joints& from, const Joints& to, double seconds) {
   std::size_t slowest = 0;
   double slowest_s = -1;
@@ -71,6 +77,7 @@ std::optional<MeasuredMotion> MotionTimes::measured() const {
   if (count() < kMovesLeast) return std::nullopt;
   MeasuredMotion motion;
   motion.move_delay_s = delay_s();
+  for (std::size_t i = 0; i < kAxisCount; ++i) motion.moves[i] = axes_[i].moves;
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (axes_[i].moves >= kMovesOfAxisLeast)
       motion.time_factor[i] = (axes_[i].product - motion.move_delay_s * axes_[i].promised) / axes_[i].promised2;

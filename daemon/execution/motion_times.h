@@ -14,6 +14,13 @@ namespace hilbrush {
 struct MeasuredMotion {
   double move_delay_s = 0;
   std::array<std::optional<double>, kAxisCount> time_factor;  ///< of axes that were the slowest often enough
+  std::array<std::uint64_t, kAxisCount> moves{};              ///< from which each factor is
+
+  /// The times of moves scatter by about a fifth about the best line, by settling and control ticks: a factor from this
+  /// many is good to one percent.
+  static constexpr std::uint64_t kMovesEnough = 400;
+  /// Whether every factor may go into a cell file.
+  bool is_enough() const;
 };
 
 class MotionTimes {

@@ -149,8 +149,13 @@ Json timing_json(const Job& job) {
   const Job::OwnTime& own = job.own_time;
   if (own.dots == 0) return nullptr;
   Json timing{{"dots", own.dots}, {"own_ms", {{"median", own.median_s * 1e3}, {"p99", own.p99_s * 1e3}}}};
-  const Json measured = Json::parse(job.measured, nullptr, false);
-  timing["measured"] = measured.is_object() ? measured : Json(nullptr);
+  Json measured = Json::parse(job.measured, nullptr, false);
+  if (!measured.is_object()) measured = nullptr;
+  for (const char* key : {"moves", "is_enough"}) {  // beside what may be copied into a cell file
+    timing[std::string("measured_") + key] = measured.is_object() && measured.contains(key) ? measured[key] : nullptr;
+    if (measured.is_object()) measured.erase(key);
+  }
+  timing["measured"] = std::move(measured);
   return timing;
 }
 

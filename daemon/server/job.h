@@ -73,7 +73,8 @@ struct Job {
     double p99_s = 0;
   } own_time;
   DurationHistogram own_times;
-  /// What moves were measured to take, as a cell file's `measured`: a JSON object as text, or empty.
+  /// What moves were measured to take, as a cell file's `measured`, with `moves` and `is_enough`: a JSON object as
+  /// text, or empty.
   std::string measured;
   MotionTimes motion_times;
 

@@ -30,13 +30,20 @@ void take_tally(Job& job, const PaintTally& tally) {
   job.progress = fraction_exposed(job);
 }
 
-/// As a cell file takes it.
+/// As a cell file takes it, and the moves that it is from.
 std::string measured_text(const MeasuredMotion& motion) {
   const auto rounded = [](double value) { return std::round(1e4 * value) / 1e4; };
   Json factors = Json::object();
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (motion.time_factor[i]) factors[kAxisNames[i]] = rounded(*motion.time_factor[i]);
-  return Json{{"move_delay_ms", rounded(1e3 * motion.move_delay_s)}, {"time_factor", factors}}.dump();
+  Json moves = Json::object();
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (motion.time_factor[i]) moves[kAxisNames[i]] = motion.moves[i];
+  return Json{{"move_delay_ms", rounded(1e3 * motion.move_delay_s)},
+              {"time_factor", factors},
+              {"moves", moves},
+              {"is_enough", motion.is_enough()}}
+      .dump();
 }
 
 void note_motion(Job& job, const MotionTimes& motion) {

@@ -88,7 +88,8 @@ Json job_schema() {
       {"timing",
        nullable("object",
                 "the time that Hilbrush itself adds to each dot: dots counted, own_ms median, p99; and what the moves "
-                "took, measured, as it may stand in a cell file")}};
+                "took, measured, as it may stand in a cell file, with measured_moves that each factor is from, and "
+                "measured_is_enough: false if these are too few for a cell file")}};
   return {{"type", "object"}, {"properties", std::move(properties)}};
 }
 

@@ -46,6 +46,12 @@ TEST(MotionTimes, TellDelayAndFactorsApart) {
 
 TEST(MotionTimes, AreNotToldOfTooFewMoves) {
   EXPECT_FALSE(moves(plain_cell(), 90, 0, 1, 3).measured());
+  const auto few = moves(plain_cell(), 120, 0, 1, 3).measured();
+  ASSERT_TRUE(few);
+  EXPECT_FALSE(few->is_enough()) << "looked at, but not for a cell file";
+  const auto many = moves(plain_cell(), 5000, 0, 1, 3).measured();
+  ASSERT_TRUE(many);
+  EXPECT_TRUE(many->is_enough());
 }
 
 TEST(MotionTimes, EqualMovesHaveAFactorAndNoDelay) {

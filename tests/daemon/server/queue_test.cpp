@@ -463,7 +463,11 @@ TEST_F(ServerDevicesTest, ADeviceThatFailsInAJobPausesItAndTheJobGoesOn) {
   EXPECT_EQ(job.at("dots").at("exposed").get<int>() + job.at("dots").at("in_doubt").get<int>(), 600);
   ASSERT_TRUE(job.at("timing").is_object());
   EXPECT_GT(job.at("timing").at("own_ms").at("p99").get<double>(), 0);
-  EXPECT_GE(job.at("timing").at("measured").at("move_delay_ms").get<double>(), 0);
+  const Json& measured = job.at("timing").at("measured");
+  EXPECT_GE(measured.at("move_delay_ms").get<double>(), 0);
+  EXPECT_EQ(measured.size(), 2u) << "as it may stand in a cell file";
+  EXPECT_TRUE(job.at("timing").at("measured_is_enough").is_boolean());
+  EXPECT_EQ(job.at("timing").at("measured_moves").size(), measured.at("time_factor").size());
   for (const auto& emission : read_emission_record(world.job_folder(id) / "emissions.ply"))
     EXPECT_FALSE(emission.is_moving);
 }
