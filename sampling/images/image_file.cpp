@@ -1,26 +1,31 @@
 #include "sampling/images/image_file.h"
 
 #include <OpenImageIO/imageio.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <mutex>
-#include <string_view>
 #include <utility>
 
 #include "sampling/base/input_error.h"
 #include "sampling/base/text.h"
+#include "sampling/images/image_header.h"
 
 namespace hilbrush {
 namespace {
 
 using std::filesystem::path;
 
-constexpr int kMaxSidePixels = 1 << 16;
 constexpr std::size_t kStripRows = 64;  ///< read at once: bounds the memory beside the texture's own
+/// A picture as its file has it, unpacked: interlaced and progressive ones are unpacked whole. 64 Mpixels of 4 channels
+/// of 16 bits, or of 2 in floating point.
+constexpr std::size_t kMaxImageBytes = std::size_t{512} << 20;
+constexpr std::size_t kMaxTileBytes = std::size_t{64} << 20;  ///< 4096 x 4096 pixels of 4 bytes
+/// None, CCITT (2 to 4), LZW, JPEG, deflate (its two numbers), packed bits. The others (LERC, JBIG, WebP, Zstandard,
+/// ...) unpack to a size that stands in their own stream, and no exporter of textures uses them.
+constexpr std::array kTiffCompressions{1, 2, 3, 4, 5, 7, 8, 32773, 32946};
 
 double srgb_to_linear(double encoded) {
   return encoded <= .04045 ? encoded / 12.92 : std::pow((encoded + .055) / 1.055, 2.4);
@@ -37,52 +42,6 @@ const std::vector<float>& linear_of_code() {
   return table;
 }
 
-/// OpenImageIO's name of the file's format by its first bytes (TGA has no signature: by its ending), or empty. Choosing
-/// the plug-in ourselves keeps the hundred other formats it knows away from untrusted bytes.
-std::string format_name(const path& file, std::string_view head) {
-  const auto starts_with = [&](std::string_view magic) { return head.substr(0, magic.size()) == magic; };
-  if (starts_with("\x89PNG\r\n\x1a\n")) return "png";
-  if (starts_with("\xff\xd8\xff")) return "jpeg";
-  if (starts_with("GIF87a") || starts_with("GIF89a")) return "gif";
-  if (starts_with("BM")) return "bmp";
-  using namespace std::string_view_literals;
-  if (starts_with("II*\0"sv) || starts_with("MM\0*"sv) || starts_with("II+\0"sv) || starts_with("MM\0+"sv))
-    return "tiff";
-  const std::string ending = lower_case(file.extension().string());
-  if (ending == ".tga" || ending == ".tpic") return "targa";
-  return "";
-}
-
-/// libjpeg fills a truncated picture with gray and OpenImageIO calls that success; a whole one has an end marker after
-/// its last scan.
-bool is_truncated_jpeg(std::string_view bytes) {
-  using namespace std::string_view_literals;
-  const std::size_t scan = bytes.rfind("\xff\xda"sv);
-  return scan == std::string_view::npos || bytes.find("\xff\xd9"sv, scan) == std::string_view::npos;
-}
-
-/// What is wrong with a PNG's chain of chunks, or empty. libpng finds out as well, but writes to
-/// stderr first.
-std::string png_fault(std::string_view bytes) {
-  const auto number = [&](std::size_t at) {
-    std::uint32_t value = 0;
-    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
-    return value;
-  };
-  constexpr std::size_t kFrame = 12;  // length, name, check sum
-  for (std::size_t at = 8; at + kFrame <= bytes.size();) {
-    const std::size_t length = number(at);
-    if (length > bytes.size() - at - kFrame) break;
-    const std::string_view named = bytes.substr(at + 4, 4 + length);
-    if (crc32(0, reinterpret_cast<const Bytef*>(named.data()), static_cast<uInt>(named.size())) !=
-        number(at + 8 + length))
-      return "the PNG picture is corrupt";
-    if (named.substr(0, 4) == "IEND") return "";
-    at += kFrame + length;
-  }
-  return "the PNG picture is truncated";
-}
-
 Result<std::string> read_bytes(const path& file, std::size_t limit) {
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
@@ -97,29 +56,37 @@ Result<std::string> read_bytes(const path& file, std::size_t limit) {
   return bytes;
 }
 
-/// OpenImageIO allocates a GIF's whole canvas before its size can be asked for.
-std::size_t gif_pixels(std::string_view bytes) {
-  const auto number = [&](std::size_t at) {
-    return std::size_t{static_cast<unsigned char>(bytes[at])} +
-           256 * std::size_t{static_cast<unsigned char>(bytes[at + 1])};
-  };
-  return bytes.size() < 10 ? 0 : number(6) * number(8);
+/// A TIFF's tile is decoded in one piece, whatever part of it the picture needs.
+std::string tiff_fault(const OIIO::ImageSpec& spec) {
+  const std::size_t tile_bytes = spec.tile_width > 0 ? spec.tile_bytes(true) : 0;
+  if (tile_bytes > kMaxTileBytes)
+    return "its tiles of " + std::to_string(spec.tile_width) + " x " + std::to_string(spec.tile_height) +
+           " pixels take " + number(static_cast<double>(tile_bytes) / (1 << 20)) + " MB each, more than the " +
+           std::to_string(kMaxTileBytes >> 20) + " MB allowed; save it in strips or smaller tiles";
+  const int compression = spec.get_int_attribute("tiff:Compression", 1);
+  if (std::ranges::find(kTiffCompressions, compression) == kTiffCompressions.end())
+    return "its compression (TIFF's number " + std::to_string(compression) +
+           ") is not read; save it uncompressed or with LZW or deflate";
+  return "";
 }
 
 /// What is wrong with the header, or empty.
 std::string header_fault(const OIIO::ImageSpec& spec, std::size_t pixel_limit) {
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1) return "it is not a flat picture";
-  if (spec.width > kMaxSidePixels || spec.height > kMaxSidePixels ||
-      static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) > pixel_limit)
-    return "it has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
-           " pixels, more than the limit allows (" + std::to_string(pixel_limit) + " left)";
+  const auto width = static_cast<std::size_t>(spec.width);
+  const auto height = static_cast<std::size_t>(spec.height);
+  if (width > kMaxSidePixels || height > kMaxSidePixels || width * height > pixel_limit)
+    return too_many_pixels(width, height, pixel_limit);
   const std::string color_space = lower_case(spec.get_string_attribute("jpeg:ColorSpace"));
   if (color_space == "cmyk" || color_space == "ycck" ||
       lower_case(spec.get_string_attribute("tiff:ColorSpace")) == "cmyk")
     return "its colors are CMYK, which have no agreed meaning on screen; save it as RGB";
   if (spec.nchannels < 1 || spec.nchannels > 4)
     return "it has " + std::to_string(spec.nchannels) + " channels; 1 to 4 are read";
-  return "";
+  if (spec.image_bytes(true) > kMaxImageBytes)
+    return "it unpacks to " + std::to_string(spec.image_bytes(true) >> 20) + " MB, more than the " +
+           std::to_string(kMaxImageBytes >> 20) + " MB allowed";
+  return tiff_fault(spec);
 }
 
 /// Turns strips of interleaved channels into rows of the texture, bottom row first.
@@ -166,7 +133,6 @@ template <class Value>
 bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, TextureFiller& filler) {
   // A tiled file is read by whole rows of tiles.
   const int step = spec.tile_height > 0 ? spec.tile_height : static_cast<int>(kStripRows);
-  if (step > kMaxSidePixels || spec.tile_width > kMaxSidePixels) return false;
   const auto channels = static_cast<std::size_t>(spec.nchannels);
   std::vector<Value> strip(static_cast<std::size_t>(std::min(step, spec.height)) *
                            static_cast<std::size_t>(spec.width) * channels);
@@ -191,16 +157,6 @@ bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeD
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
-}
-
-/// Why OpenImageIO must not see the bytes, or empty.
-std::string fault_before_decoding(const std::string& format, std::string_view bytes, std::size_t pixel_limit) {
-  if (format.empty()) return "it is not a PNG, JPEG, GIF, TGA, BMP or TIFF picture";
-  if (format == "jpeg" && is_truncated_jpeg(bytes)) return "the JPEG picture is truncated";
-  if (format == "png") return png_fault(bytes);
-  if (format == "gif" && gif_pixels(bytes) > pixel_limit)
-    return "it has more pixels than the limit allows (" + std::to_string(pixel_limit) + " left)";
-  return "";
 }
 
 /// @throws what OpenImageIO throws
@@ -239,7 +195,7 @@ Result<Texture> load_image_file(const path& file, std::size_t pixel_limit) {
   // No useful picture has more than 16 bytes a pixel in its file, but small ones may carry metadata.
   const auto bytes = read_bytes(file, (std::size_t{16} << 20) + 16 * std::min<std::size_t>(pixel_limit, 16u << 20));
   if (!bytes) return Failure{bytes.reason()};
-  const std::string format = format_name(file, *bytes);
+  const std::string format = image_format(file, *bytes);
   if (std::string fault = fault_before_decoding(format, *bytes, pixel_limit); !fault.empty())
     return Failure{std::move(fault)};
   try {
