@@ -17,8 +17,8 @@ constexpr std::size_t kProgressSteps = 16;
 constexpr double kFlattenShare = .7;
 
 std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbors& neighbors,
-                                       const std::vector<Component>& components, const Progress& progress) {
-  const double area = mesh.area_m2();
+                                       const std::vector<Component>& components, double area,
+                                       const Progress& progress) {
   std::vector<FlatComponent> flats(components.size());
   std::size_t done = 0;
   for (std::size_t begin = 0, end = 0; begin < components.size(); begin = end) {
@@ -101,7 +101,8 @@ struct PieceIndex {
 
 Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<Component>& components,
                     CurveKind kind, const Progress& progress) {
-  std::vector<FlatComponent> flats = flatten_all(mesh, neighbors, components, progress.part(0, kFlattenShare));
+  const double area = mesh.area_m2();
+  std::vector<FlatComponent> flats = flatten_all(mesh, neighbors, components, area, progress.part(0, kFlattenShare));
   Charts result;
   std::vector<PieceIndex> pieces;
   std::vector<ChainPiece> chain_pieces_of;
@@ -121,11 +122,11 @@ Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const 
     Chart& chart = result.charts[i];
     if (piece.is_mapped()) {
       chart = chart_on_square(piece, chain[i].symmetry, kind);
-      is_too_sheared[i] = !build_base_tree(chart, mesh);
+      is_too_sheared[i] = !build_base_tree(chart, mesh, area);
     }
     if (!piece.is_mapped() || is_too_sheared[i]) {
       chart = chart_in_space(triangles_of(piece));
-      build_base_tree(chart, mesh);
+      build_base_tree(chart, mesh, area);
     }
     chart.component = index.component;
     piece = {};

@@ -39,7 +39,7 @@ class TreeBuilder {
   static constexpr int kDimensions = kDimensionsOf<Curve>;
   using Place = Eigen::Matrix<double, kDimensions, 1>;
 
-  TreeBuilder(Chart& chart, const TexturedMesh& mesh)
+  TreeBuilder(Chart& chart, const TexturedMesh& mesh, double mesh_area_m2)
       : chart_(chart), mesh_(mesh), too_many_(std::pow(Curve::kSide, kTooManyExponent)) {
     double area = 0;
     faces_.reserve(chart.faces.size());
@@ -48,8 +48,7 @@ class TreeBuilder {
       area += faces_.back().area;
     }
     small_area_ = kSmallShare * area / static_cast<double>(std::max<std::size_t>(1, faces_.size()));
-    large_area_ = mesh.area_m2() / kMinQuads;
-    for (auto& level : levels_) level.resize(Curve::kChildCount);
+    large_area_ = mesh_area_m2 / kMinQuads;
   }
 
   void build() {
@@ -169,6 +168,7 @@ class TreeBuilder {
     if (is_too_much && kDimensions == 2) return;
     if (is_too_much || is_leaf(list, size, depth)) return add_leaf(low, size, curve, depth, list);
     auto& children = levels_[static_cast<std::size_t>(depth)];
+    children.resize(Curve::kChildCount);  // not before: most charts of a mesh in many parts are shallow
     const double child_size = size / Curve::kSide;
     std::size_t count = 0;
     for (unsigned slot = 0; slot < Curve::kChildCount; ++slot) {
@@ -231,9 +231,9 @@ void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensi
 template void clip_to_box<2>(Piece<2>&, const Eigen::Vector2d&, double);
 template void clip_to_box<3>(Piece<3>&, const Eigen::Vector3d&, double);
 
-bool build_base_tree(Chart& chart, const TexturedMesh& mesh) {
+bool build_base_tree(Chart& chart, const TexturedMesh& mesh, double mesh_area_m2) {
   return with_curve(chart.kind, [&]<class Curve>(Curve) {
-    TreeBuilder<Curve>(chart, mesh).build();
+    TreeBuilder<Curve>(chart, mesh, mesh_area_m2).build();
     return kDimensionsOf<Curve> == 3 || chart.face_lists.size() <= kMaxListed + kMaxListedPerFace * chart.faces.size();
   });
 }

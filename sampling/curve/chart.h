@@ -89,8 +89,9 @@ Piece<kDimensions> whole_piece(const Chart& chart, const TexturedMesh& mesh, con
 template <int kDimensions>
 void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size);
 
-/// Builds the base tree of a chart that has its faces. Cost O(faces log faces). On the square it gives up and
-/// returns false if the map is so sheared that the quads would hold each triangle many times.
-bool build_base_tree(Chart& chart, const TexturedMesh& mesh);
+/// Builds the base tree of a chart that has its faces; `mesh_area_m2` is the whole mesh's area, which a caller with
+/// many charts sums once. Cost O(faces log faces). On the square it gives up and returns false if the map is so sheared
+/// that the quads would hold each triangle many times.
+bool build_base_tree(Chart& chart, const TexturedMesh& mesh, double mesh_area_m2);
 
 }  // namespace hilbrush

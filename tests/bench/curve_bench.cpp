@@ -167,7 +167,7 @@ void print_tree(const TexturedMesh& mesh, const SurfaceCurve& curve, const Secon
     tree.cpu += time(kRepeats, [&] {
                   again.base_quads.clear();
                   again.face_lists.clear();
-                  build_base_tree(again, mesh);
+                  build_base_tree(again, mesh, mesh.area_m2());
                 }).cpu;
     quads += chart.base_quads.size();
     listed += chart.face_lists.size();
