@@ -61,6 +61,10 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
     const SpotModel spot = options.spot(dots.pitch_m);
     dots = refine_dots(curve, tone, std::move(dots), spot, {.passes = options.fine_passes}, next_part());
   }
+  // Since they were placed, filling holes has added dots, and the predictive loop and the search have moved some.
+  PathMeter meter(figures.path);
+  meter.follow(dots.dots);
+  meter.finish();
   figures.dots_of_level = count_levels(dots, options.levels);
   if (report) *report = std::move(figures);
   return dots;

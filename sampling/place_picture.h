@@ -27,7 +27,7 @@ struct PictureOptions {
 };
 
 struct PictureReport {
-  SampleReport path;
+  SampleReport path;  ///< along the dots that are returned
   PredictiveReport predictive;
   FillReport filled;
   std::vector<std::uint64_t> dots_of_level;  ///< one element for each level
