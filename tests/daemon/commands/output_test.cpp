@@ -225,7 +225,7 @@ TEST(ProgressDisplay, TheTimeLeftIsNeverCutAtEightyColumns) {
   {
     ProgressDisplay display(terminal, false);
     display.show("painting", .25, format_job_brief(job));
-    EXPECT_EQ(out.str(), "[####.............] job 12345: painting, copy 100 of 1,000, 25 %, 10:01:05 left");
+    EXPECT_EQ(out.str(), "[##......] job 12345: painting, copy 100 of 1,000, 25 %, 10:01:05 left");
     out.str("");
   }
   terminal.width = 200;
