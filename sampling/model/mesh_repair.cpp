@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
 #include "sampling/base/input_error.h"
 #include "sampling/base/union_find.h"
 #include "sampling/model/edges.h"
+#include "sampling/model/near_vertices.h"
 #include "sampling/model/renumber.h"
 
 namespace hilbrush {
@@ -16,7 +18,16 @@ namespace {
 /// Height over longest side: below this a triangle's area and normal are rounding errors.
 constexpr double kMinHeightRatio = 1e-10;
 
-/// Keeps the triangles for which `keep` is true, with everything that belongs to them. Returns how many were dropped.
+/// Vertices nearer to each other than this share of the model's largest extent are one: .1 nm of 100 mm, far
+/// below any feature, and above what a few operations in double precision leave of equal points.
+constexpr double kWeldShare = 1e-9;
+/// The holes of an almost closed part make at most this share of its area; the opening of a half sphere makes
+/// half.
+constexpr double kMaxHoleShare = .125;
+constexpr double kMaxFanShare = .25;  ///< the same of the triangles that fill them
+
+/// Keeps the triangles for which `keep` is true, with everything that belongs to them. Returns how many were
+/// dropped.
 template <class Keep>
 std::size_t keep_triangles(TexturedMesh& mesh, Keep keep) {
   std::size_t kept = 0;
@@ -43,23 +54,25 @@ void turn_over(TexturedMesh& mesh, std::size_t t) {
 }
 
 bool has_usable_corners(const TexturedMesh& mesh, std::size_t t) {
-  return std::ranges::all_of(mesh.triangles[t],
-                             [&](std::uint32_t v) { return v < mesh.vertices.size() && mesh.vertices[v].allFinite(); });
+  return std::ranges::all_of(mesh.triangles[t], [&](std::uint32_t v) {
+    return v < mesh.vertices.size() && mesh.vertices[v].allFinite();
+  });
 }
 
-/// The corner where the shortest side of a triangle begins, if that side is as good as a point compared with the
-/// longest one.
+/// The corner where the shortest side of a triangle begins, if that side is as good as a point compared with
+/// the longest one.
 std::optional<std::size_t> collapsed_side(const TexturedMesh& mesh, std::size_t t) {
   std::array<double, 3> length2{};
-  for (std::size_t k = 0; k < 3; ++k) length2[k] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
+  for (std::size_t k = 0; k < 3; ++k)
+    length2[k] = (mesh.corner(t, (k + 1) % 3) - mesh.corner(t, k)).squaredNorm();
   const auto shortest = std::min_element(length2.begin(), length2.end());
   const double longest2 = *std::max_element(length2.begin(), length2.end());
   if (!(*shortest > 0) || *shortest > kMinHeightRatio * kMinHeightRatio * longest2) return std::nullopt;
   return static_cast<std::size_t>(shortest - length2.begin());
 }
 
-/// Gives the ends of collapsed sides one position, so that triangles that were connected by such a triangle remain
-/// connected. Poles whose vertices differ by rounding have such sides. Returns whether there were any.
+/// Gives the ends of collapsed sides one position, so that triangles that were connected by such a triangle
+/// remain connected. Poles whose vertices differ by rounding have such sides. Returns whether there were any.
 bool close_collapsed_sides(TexturedMesh& mesh) {
   UnionFind positions(mesh.vertices.size());
   bool is_any = false;
@@ -83,8 +96,8 @@ bool has_area(const TexturedMesh& mesh, std::size_t t) {
   return 2 * mesh.area_vector(t).norm() > kMinHeightRatio * longest2;
 }
 
-/// Gives equal positions one vertex, and drops the vertices that no triangle uses. Returns how many became one with
-/// another.
+/// Gives equal positions one vertex, and drops the vertices that no triangle uses. Returns how many became
+/// one with another.
 std::size_t weld_vertices(TexturedMesh& mesh) {
   std::vector<char> is_used(mesh.vertices.size(), 0);
   for (const Triangle& triangle : mesh.triangles)
@@ -127,6 +140,23 @@ std::size_t weld_vertices(TexturedMesh& mesh) {
   return welded;
 }
 
+/// Gives vertices that differ by rounding the position of the first of them. Returns whether there were any.
+bool close_gaps(TexturedMesh& mesh) {
+  const auto [low, high] = bounds(mesh);
+  const double distance = kWeldShare * (high - low).maxCoeff();
+  if (!(distance > 0) || !std::isfinite(distance)) return false;
+  UnionFind positions(mesh.vertices.size());
+  bool is_any = false;
+  NearVertices(mesh.vertices, distance).for_each_pair([&](std::uint32_t v, std::uint32_t w) {
+    positions.unite(v, w);
+    is_any = true;
+  });
+  if (is_any)
+    for (std::uint32_t v = 0; v < positions.size(); ++v)
+      mesh.vertices[v] = Eigen::Vector3d(mesh.vertices[positions.root(v)]);
+  return is_any;
+}
+
 std::size_t drop_duplicates(TexturedMesh& mesh) {
   std::vector<std::pair<Triangle, std::uint32_t>> sorted;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -146,8 +176,8 @@ bool are_oriented_alike(const std::vector<Triangle>& triangles, TriangleSide a, 
   return triangles[a.triangle][a.side] != triangles[b.triangle][b.side];
 }
 
-/// Orients each part of the surface that is connected by edges of two triangles: neighbors alike, as most of the part
-/// already was. Edges where that is impossible (a Moebius strip has one) are cut.
+/// Orients each part of the surface that is connected by edges of two triangles: neighbors alike, as most of
+/// the part already was. Edges where that is impossible (a Moebius strip has one) are cut.
 class Orientation {
  public:
   Orientation(TexturedMesh& mesh, const EdgeTable& edges) : mesh_(mesh), partners_(mesh.triangle_count()) {
@@ -239,7 +269,8 @@ struct SideAround {
 
 /// The sides on one edge, by their angle.
 
-std::vector<SideAround> sort_around(const TexturedMesh& mesh, const EdgeTable& edges, const EdgeGroup& group) {
+std::vector<SideAround> sort_around(const TexturedMesh& mesh, const EdgeTable& edges,
+                                    const EdgeGroup& group) {
   const Eigen::Vector3d origin = mesh.vertices[group.from];
   const Eigen::Vector3d axis = (mesh.vertices[group.to] - origin).normalized();
   Eigen::Vector3d x = axis.unitOrthogonal();
@@ -248,16 +279,18 @@ std::vector<SideAround> sort_around(const TexturedMesh& mesh, const EdgeTable& e
   for (std::uint32_t i = group.begin; i < group.end; ++i) {
     const TriangleSide s = edges.sides[i];
     const Eigen::Vector3d apex = mesh.corner(s.triangle, (s.side + 2) % 3) - origin;
-    around.push_back({s, std::atan2(apex.dot(y), apex.dot(x)), mesh.triangles[s.triangle][s.side] == group.from});
+    around.push_back(
+        {s, std::atan2(apex.dot(y), apex.dot(x)), mesh.triangles[s.triangle][s.side] == group.from});
   }
   std::stable_sort(around.begin(), around.end(),
                    [](const SideAround& a, const SideAround& b) { return a.angle < b.angle; });
   return around;
 }
 
-/// Joins the triangles on edges with more than two of them in pairs that enclose a solid; returns how many such edges
-/// there are.
-std::size_t pair_up_crowded_edges(const TexturedMesh& mesh, const EdgeTable& edges, Orientation& orientation) {
+/// Joins the triangles on edges with more than two of them in pairs that enclose a solid; returns how many
+/// such edges there are.
+std::size_t pair_up_crowded_edges(const TexturedMesh& mesh, const EdgeTable& edges,
+                                  Orientation& orientation) {
   std::size_t crowded = 0;
   for (const EdgeGroup& group : edges.groups) {
     if (group.end - group.begin <= 2) continue;
@@ -265,9 +298,9 @@ std::size_t pair_up_crowded_edges(const TexturedMesh& mesh, const EdgeTable& edg
     const auto around = sort_around(mesh, edges, group);
     const std::size_t n = around.size();
     std::vector<char> is_joined(n, 0);
-    // The outside of a triangle that runs along the edge is towards growing angles, that of one that runs against it
-    // towards falling angles. So the sector between one that runs against and a following one that runs along is
-    // inside: the two enclose a solid.
+    // The outside of a triangle that runs along the edge is towards growing angles, that of one that runs
+    // against it towards falling angles. So the sector between one that runs against and a following one that
+    // runs along is inside: the two enclose a solid.
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t next = (i + 1) % n;
       if (is_joined[i] || is_joined[next] || around[i].runs_along || !around[next].runs_along) continue;
@@ -278,31 +311,114 @@ std::size_t pair_up_crowded_edges(const TexturedMesh& mesh, const EdgeTable& edg
   return crowded;
 }
 
-/// Closed parts with a negative volume are inside out.
-std::size_t turn_closed_parts_outwards(const TexturedMesh& mesh, Orientation& orientation) {
-  std::size_t turned = 0;
+/// A part of the surface: its triangles, the sides that no triangle joins, and the sum of its
+/// triangles' area vectors times their heights over a point of it: three times its volume, if it is closed.
+struct Part {
+  std::vector<std::uint32_t> triangles;
+  std::vector<TriangleSide> boundary;
+  double volume = 0;
+  double area = 0;
+};
+
+Part collect_part(const TexturedMesh& mesh, const Neighbors& partners, std::uint32_t seed,
+                  std::vector<char>& is_seen) {
+  Part part;
+  is_seen[seed] = 1;
+  part.triangles.push_back(seed);
+  const Eigen::Vector3d& origin = mesh.corner(seed, 0);
+  for (std::size_t i = 0; i < part.triangles.size(); ++i) {
+    const std::uint32_t t = part.triangles[i];
+    const Eigen::Vector3d area_vector = mesh.area_vector(t);
+    part.volume += area_vector.dot(mesh.corner(t, 0) - origin);
+    part.area += area_vector.norm();
+    for (std::uint8_t s = 0; s < 3; ++s) {
+      const TriangleSide other = partners[t][s];
+      if (other == kNoSide) {
+        part.boundary.push_back({t, s});
+      } else if (!is_seen[other.triangle]) {
+        is_seen[other.triangle] = 1;
+        part.triangles.push_back(other.triangle);
+      }
+    }
+  }
+  return part;
+}
+
+/// The volume that fans of triangles around the centers of a part's holes add to it, and their size.
+struct Filling {
+  double volume = 0;
+  double area = 0;           ///< as the holes' rims enclose it, ragged or not
+  double fan_area = 0;       ///< of the triangles, which is much larger where a rim is not nearly flat
+  double hidden_volume = 0;  ///< what the surface that is missing might enclose, at most
+};
+
+/// Sides that share vertices make one hole.
+Filling fill_holes_of(const TexturedMesh& mesh, const Part& part) {
+  std::map<std::uint32_t, std::uint32_t> number_of_vertex;
+  for (const TriangleSide& side : part.boundary)
+    for (std::size_t end = 0; end < 2; ++end)
+      number_of_vertex.try_emplace(mesh.triangles[side.triangle][(side.side + end) % 3],
+                                   static_cast<std::uint32_t>(number_of_vertex.size()));
+  UnionFind holes(number_of_vertex.size());
+  const auto ends_of = [&](const TriangleSide& side) {
+    const Triangle& triangle = mesh.triangles[side.triangle];
+    return std::array{triangle[side.side], triangle[(side.side + 1u) % 3]};
+  };
+  for (const TriangleSide& side : part.boundary) {
+    const auto [from, to] = ends_of(side);
+    holes.unite(number_of_vertex[from], number_of_vertex[to]);
+  }
+  std::vector<Eigen::Vector3d> center(holes.size(), Eigen::Vector3d::Zero());
+  std::vector<double> count(holes.size(), 0);
+  std::vector<Eigen::Vector3d> area(holes.size(), Eigen::Vector3d::Zero());
+  for (const auto& [vertex, number] : number_of_vertex) {
+    center[holes.root(number)] += mesh.vertices[vertex];
+    ++count[holes.root(number)];
+  }
+  Filling filling;
+  const Eigen::Vector3d& origin = mesh.corner(part.triangles[0], 0);
+  for (const TriangleSide& side : part.boundary) {
+    const auto [from, to] = ends_of(side);
+    const std::uint32_t hole = holes.root(number_of_vertex[from]);
+    const Eigen::Vector3d middle = center[hole] / count[hole];
+    const Eigen::Vector3d& a = mesh.vertices[from];
+    const Eigen::Vector3d& b = mesh.vertices[to];
+    const Eigen::Vector3d area_vector = .5 * (a - b).cross(middle - b);
+    filling.volume += area_vector.dot(b - origin);
+    filling.fan_area += area_vector.norm();
+    area[hole] += area_vector;
+  }
+  for (const Eigen::Vector3d& each : area) {
+    filling.area += each.norm();
+    filling.hidden_volume += std::pow(each.norm(), 1.5);  // a half sphere over the hole has .38 times that
+  }
+  return filling;
+}
+
+/// Closed parts are inside out if their volume is negative. So are almost closed ones (scans with holes), if
+/// that is clear: a bowl or a sheet may well show its inside on purpose.
+bool is_inside_out(const TexturedMesh& mesh, const Part& part) {
+  if (part.boundary.empty()) return part.volume < 0;
+  const Filling filling = fill_holes_of(mesh, part);
+  if (filling.area > kMaxHoleShare * part.area || filling.fan_area > kMaxFanShare * part.area) return false;
+  // Sums of area vector times height are three volumes.
+  return part.volume + filling.volume < -3 * filling.hidden_volume;
+}
+
+struct Turned {
+  std::size_t closed = 0;         ///< triangles of closed parts
+  std::size_t almost_closed = 0;  ///< of parts with holes
+};
+
+Turned turn_parts_outwards(const TexturedMesh& mesh, Orientation& orientation) {
+  Turned turned;
   std::vector<char> is_seen(mesh.triangle_count(), 0);
   for (std::uint32_t seed = 0; seed < is_seen.size(); ++seed) {
     if (is_seen[seed]) continue;
-    is_seen[seed] = 1;
-    std::vector<std::uint32_t> part{seed};
-    bool is_closed = true;
-    double volume = 0;
-    const Eigen::Vector3d& origin = mesh.corner(seed, 0);
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      volume += mesh.area_vector(part[i]).dot(mesh.corner(part[i], 0) - origin);
-      for (const TriangleSide other : orientation.partners()[part[i]]) {
-        if (other == kNoSide) {
-          is_closed = false;
-        } else if (!is_seen[other.triangle]) {
-          is_seen[other.triangle] = 1;
-          part.push_back(other.triangle);
-        }
-      }
-    }
-    if (!is_closed || volume >= 0) continue;
-    for (const auto t : part) orientation.turn_with_partners(t);
-    turned += part.size();
+    const Part part = collect_part(mesh, orientation.partners(), seed, is_seen);
+    if (!is_inside_out(mesh, part)) continue;
+    for (const auto t : part.triangles) orientation.turn_with_partners(t);
+    (part.boundary.empty() ? turned.closed : turned.almost_closed) += part.triangles.size();
   }
   return turned;
 }
@@ -349,25 +465,28 @@ RepairedMesh repair_mesh(TexturedMesh mesh) {
   count("triangles without usable corners dropped",
         keep_triangles(mesh, [&](std::size_t t) { return has_usable_corners(mesh, t); }));
   std::size_t welded = weld_vertices(mesh);
+  if (close_gaps(mesh)) welded += weld_vertices(mesh);
   if (close_collapsed_sides(mesh)) welded += weld_vertices(mesh);
   count("vertices welded", welded);
-  count("degenerate triangles dropped", keep_triangles(mesh, [&](std::size_t t) { return has_area(mesh, t); }));
+  count("degenerate triangles dropped",
+        keep_triangles(mesh, [&](std::size_t t) { return has_area(mesh, t); }));
   count("duplicate triangles dropped", drop_duplicates(mesh));
   if (mesh.triangles.empty()) throw InputError("", "the model has no triangle with an area");
   weld_vertices(mesh);  // vertices of dropped triangles go
 
   const EdgeTable edges = edge_table(mesh.triangles);
   Orientation orientation(mesh, edges);
-  std::size_t turned = orientation.orient();
+  const std::size_t turned = orientation.orient();
   count("edges cut where the surface has one side only", orientation.cut_count());
   // Turning triangles over renumbered their sides, so the edge table is built again.
   const std::size_t crowded = pair_up_crowded_edges(mesh, edge_table(mesh.triangles), orientation);
-  turned += turn_closed_parts_outwards(mesh, orientation);
-  count("triangles turned over", turned);
+  const Turned outwards = turn_parts_outwards(mesh, orientation);
+  count("triangles turned over", turned + outwards.closed);
+  count("triangles of almost closed parts turned over, which were inside out", outwards.almost_closed);
   count("edges split where more than two triangles meet", crowded);
   std::size_t split = split_vertices(mesh, orientation.partners());
-  // A cut may end inside the surface, where both its sides still have the same vertices. From here on connection
-  // follows from the triangles alone, so it is found from them until nothing more is split.
+  // A cut may end inside the surface, where both its sides still have the same vertices. From here on
+  // connection follows from the triangles alone, so it is found from them until nothing more is split.
   for (std::size_t added = split; added > 0; split += added)
     added = split_vertices(mesh, find_neighbors(mesh.triangles));
   count("vertices split where parts only touch", split);

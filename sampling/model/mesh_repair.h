@@ -4,10 +4,11 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// Turns a triangle soup into a mesh that can be cut and mapped: welds equal positions, drops degenerate and duplicate
-/// triangles, orients neighbors consistently (closed components outwards, open ones as most of their triangles are),
-/// splits what is not manifold. Afterwards every edge has one or two triangles and every vertex one fan. Every repair
-/// is counted. Large meshes are renumbered, see renumber.h.
+/// Turns a triangle soup into a mesh that can be cut and mapped: welds positions that are equal but for
+/// rounding, drops degenerate and duplicate triangles, orients neighbors consistently (closed and almost
+/// closed components outwards, open ones as most of their triangles are), splits what is not manifold.
+/// Afterwards every edge has one or two triangles and every vertex one fan. Every repair is counted. Large
+/// meshes are renumbered, see renumber.h.
 namespace hilbrush {
 
 struct Repair {
