@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxUrlBytes = 1024;
 constexpr std::size_t kSpellingLimit = 16;  ///< of one url
 constexpr std::size_t kChunkBytes = 1 << 18;
+constexpr std::size_t kMaxFiles = 4;  ///< all files of a model are at most this many times as large as one may be
 
 int hex_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -105,12 +106,16 @@ std::string ModelFolder::read(const fs::path& file) {
   if (!in || (size > 0 && !in.read(bytes.data(), static_cast<std::streamsize>(size))))
     throw InputError(name(file), "the file cannot be read");
   note(file);
-  if (bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b') return gunzip(bytes, file_bytes_, name(file));
+  if (bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b') bytes = gunzip(bytes, file_bytes_, name(file));
+  read_bytes_ += bytes.size();
+  if (read_bytes_ > kMaxFiles * file_bytes_)
+    throw InputError(name(file), "the model's files together are larger than the limit of " +
+                                     std::to_string(kMaxFiles * file_bytes_) + " bytes");
   return bytes;
 }
 
 void ModelFolder::note(const fs::path& file) {
-  if (std::find(files_.begin(), files_.end(), file) == files_.end()) files_.push_back(file);
+  if (noted_.insert(file.string()).second) files_.push_back(file);
 }
 
 std::string ModelFolder::name(const fs::path& file) const {
@@ -137,7 +142,13 @@ std::string gunzip(const std::string& bytes, std::size_t limit, const std::strin
     out.append(chunk, 0, chunk.size() - stream.avail_out);
     if (out.size() > limit)
       throw InputError(file, "unpacks to more than the limit of " + std::to_string(limit) + " bytes");
-    if (status == Z_STREAM_END) return out;
+    if (status == Z_STREAM_END) {
+      // A gzip file may have several members, one after another; what follows the last one is padding.
+      const bool has_member = stream.avail_in >= 2 && stream.next_in[0] == 0x1f && stream.next_in[1] == 0x8b;
+      if (!has_member) return out;
+      if (inflateReset(&stream) != Z_OK) throw InputError(file, "cannot be gunzipped");
+      continue;
+    }
     if (status != Z_OK || (stream.avail_in == 0 && stream.avail_out > 0))
       throw InputError(file, "the gzip data is truncated or corrupt");
   }

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,8 @@ class ModelFolder {
   /// not there, not a regular file, or not below the model's folder.
   Result<std::filesystem::path> find(const std::filesystem::path& base, const std::string& url) const;
 
-  /// The bytes of a file, gunzipped if they are gzip. @throws InputError naming the file if it cannot be read or is
-  /// too large.
+  /// The bytes of a file, gunzipped if they are gzip. @throws InputError naming the file if it cannot be read, is too
+  /// large, or all files together are.
   std::string read(const std::filesystem::path& file);
 
   /// Notes that `file` was read otherwise than by read() (an image).
@@ -39,10 +40,12 @@ class ModelFolder {
 
   std::filesystem::path folder_;
   std::size_t file_bytes_;
+  std::size_t read_bytes_ = 0;  ///< of all files, unpacked
   std::vector<std::filesystem::path> files_;
+  std::set<std::string> noted_;
 };
 
-/// Gunzips `bytes`. @throws InputError at `file` if they are corrupt or grow beyond `limit`.
+/// Gunzips `bytes`, all members of them. @throws InputError at `file` if they are corrupt or grow beyond `limit`.
 std::string gunzip(const std::string& bytes, std::size_t limit, const std::string& file);
 
 }  // namespace hilbrush
