@@ -106,7 +106,7 @@ Model load_model(const fs::path& file, const ImageReader& read_image, const Mode
       model = load_ply(std::move(text), name, folder, read_image, limits);
       break;
     case Kind::kOff:
-      model = load_off(std::move(text), name, folder, read_image, limits);
+      model = load_off(std::move(text), name, limits);
       break;
     case Kind::kStl:
       model = load_stl(std::move(text), name, limits);

@@ -9,8 +9,8 @@
 #include "sampling/base/result.h"
 #include "sampling/model/textured_mesh.h"
 
-/// Model files in: VRML 2.0 (and the common part of 1.0) by our own reader in vrml/, OBJ+MTL, PLY, OFF and STL through
-/// OpenMesh. The kind is found from the first bytes, then from the name's ending. All bytes are untrusted.
+/// Model files in: VRML 2.0 (and the common part of 1.0) in vrml/, OBJ+MTL, PLY, OFF and STL in files/, by readers of
+/// our own. The kind is found from the first bytes, then from the name's ending. All bytes are untrusted.
 namespace hilbrush {
 
 /// What untrusted input may cost. To exceed a limit is an InputError that names it.

@@ -7,7 +7,7 @@
 #include "sampling/model/model_file.h"
 #include "tests/fuzz/playground.h"
 
-/// libFuzzer: the formats that go through OpenMesh; the first byte picks one.
+/// libFuzzer: the formats of sampling/model/files; the first byte picks one.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const hilbrush::Playground playground;
   if (size == 0) return 0;

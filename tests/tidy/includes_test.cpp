@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <regex>
-#include <set>
 
 #include "tests/support/shell.h"
 #include "tests/tidy/source_tree.h"
@@ -164,13 +163,10 @@ TEST(Includes, NoFolderIncludesOneThatIncludesIt) {
 }
 
 TEST(Includes, HeavyHeadersStayInSourceFiles) {
-  // Shared by the source files of one library, and never included from another folder.
-  const std::set<std::string> kPrivate{"sampling/model/files/polygon_importer.h"};
   static const std::regex kHeavy(
       "OpenMesh/.*|OpenImageIO/.*|boost/.*|nlohmann/json\\.hpp|spdlog/.*|CLI/.*|embree3/.*|SQLiteCpp/.*");
   for (const SourceFile& file : source_files()) {
-    if (!file.has_ending(".h") || file.is_below("tests") || file.is_below("daemon") || kPrivate.contains(file.path))
-      continue;
+    if (!file.has_ending(".h") || file.is_below("tests") || file.is_below("daemon")) continue;
     for (const auto& [line, include] : includes_of(file)) {
       EXPECT_FALSE(std::regex_match(include.header, kHeavy))
           << file.path << ":" << line << ": keep " << include.header << " in a .cpp file";

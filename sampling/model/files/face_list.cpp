@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
 
 double linear_of_srgb(double encoded) {
-  const double c = std::clamp(encoded, 0., 1.);
+  const double c = encoded > 0 ? std::min(encoded, 1.) : 0.;  // not a number is black
   return c <= .04045 ? c / 12.92 : std::pow((c + .055) / 1.055, 2.4);
 }
 

@@ -4,10 +4,8 @@
 #include "sampling/model/model_file.h"
 #include "sampling/model/model_folder.h"
 
-/// The mesh formats that OpenMesh reads. Its readers fill a list of polygons here, not one of its meshes, so that faces
-/// which do not fit together as a manifold arrive as they are and mesh_repair reports what it does about them. What its
-/// readers cannot cope with (files that name other files, wrong counts, endless lists) is checked or rewritten before
-/// they see the bytes.
+/// The mesh formats. Their readers fill a list of polygons, in double precision, so that faces which do not fit together
+/// as a manifold arrive as they are and mesh_repair reports what it does about them. No count of a file is believed.
 namespace hilbrush {
 
 /// OBJ with its MTL: one texture or color a material, colors a vertex. `text` is the whole file, `name` what messages
@@ -22,8 +20,7 @@ Model load_ply(std::string text, const std::string& name, ModelFolder& folder, c
                const ModelLimits& limits);
 
 /// OFF, ASCII: colors a vertex or a face.
-Model load_off(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
-               const ModelLimits& limits);
+Model load_off(std::string text, const std::string& name, const ModelLimits& limits);
 
 /// STL, ASCII and binary.
 Model load_stl(std::string text, const std::string& name, const ModelLimits& limits);

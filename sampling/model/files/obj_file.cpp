@@ -1,17 +1,19 @@
-#include <OpenMesh/Core/IO/reader/OBJReader.hh>
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <map>
+#include <optional>
+#include <set>
+#include <vector>
 
-#include "sampling/base/check.h"
 #include "sampling/base/input_error.h"
+#include "sampling/model/files/face_list.h"
 #include "sampling/model/files/mesh_file.h"
-#include "sampling/model/files/openmesh_reading.h"
-#include "sampling/model/files/polygon_importer.h"
 #include "sampling/model/files/text_lines.h"
+#include "sampling/model/model_images.h"
 
-/// OBJ. OpenMesh opens whatever a mtllib line names, resolves relative indices against the end of the file, misreads
-/// what follows a coordinate that is not a number and forgets which material a face had. So the text is first put into
-/// plain form: only v, vt and f lines, indices absolute and in range; materials are read here.
+/// OBJ: v, vt, f, usemtl and mtllib lines; the others say nothing of the surface. Indices are relative to where they
+/// stand or absolute.
 namespace hilbrush {
 namespace {
 
@@ -23,13 +25,12 @@ struct MtlMaterial {
   std::string texture;
 };
 
-/// The file in plain form.
-struct PlainObj {
-  std::string text;
+/// What the file holds.
+struct ObjContent {
+  FaceList faces;
   std::vector<std::uint32_t> material_of_face;  ///< index into `materials`
   std::vector<std::string> materials{""};       ///< names by first use; "" before any usemtl
   std::vector<std::string> libraries;
-  bool has_colors = false;
   std::vector<std::string> warnings;
 };
 
@@ -66,12 +67,12 @@ class ObjLines {
   int number_ = 0;  ///< of the line at hand
 };
 
-class ObjPlainer {
+class ObjReader {
  public:
-  ObjPlainer(std::string_view text, const std::string& name, const ModelLimits& limits)
+  ObjReader(std::string_view text, const std::string& name, const ModelLimits& limits)
       : lines_(text), name_(name), limits_(limits) {}
 
-  PlainObj run() {
+  ObjContent run() {
     while (lines_.next()) {
       std::string_view rest = lines_.line();
       const std::string_view key = take_word(rest);
@@ -84,60 +85,56 @@ class ObjPlainer {
       } else if (key == "usemtl") {
         use_material(std::string(trimmed(rest)));
       } else if (key == "mtllib") {
-        if (plain_.libraries.size() < 16) plain_.libraries.emplace_back(trimmed(rest));
+        if (content_.libraries.size() < 16) content_.libraries.emplace_back(trimmed(rest));
       }
     }
-    if (colored_count_ > 0 && colored_count_ < vertex_count_)
-      plain_.warnings.push_back(name_ + ": " + std::to_string(vertex_count_ - colored_count_) + " of " +
-                                std::to_string(vertex_count_) + " points have no color; they are white");
-    plain_.has_colors = colored_count_ > 0;
+    if (colored_count_ > 0 && colored_count_ < points().size())
+      content_.warnings.push_back(name_ + ": " + std::to_string(points().size() - colored_count_) + " of " +
+                                  std::to_string(points().size()) + " points have no color; they are white");
+    if (colored_count_ > 0) set_colors();
     if (dropped_count_ > 0)
-      plain_.warnings.push_back(at(first_dropped_) + ": " + std::to_string(dropped_count_) +
-                                " faces were dropped: they name points that do not exist (this is the first)");
+      content_.warnings.push_back(at(first_dropped_) + ": " + std::to_string(dropped_count_) +
+                                  " faces were dropped: they name points that do not exist (this is the first)");
     if (short_count_ > 0)
-      plain_.warnings.push_back(at(first_short_) + ": " + std::to_string(short_count_) +
-                                " faces with fewer than three different corners were dropped (this is the first)");
-    plain_.text = std::move(vertices_);
-    plain_.text += faces_;
-    plain_.text += '\n';
-    return std::move(plain_);
+      content_.warnings.push_back(at(first_short_) + ": " + std::to_string(short_count_) +
+                                  " faces with fewer than three different corners were dropped (this is the first)");
+    content_.faces.at = name_;
+    return std::move(content_);
   }
 
  private:
   std::string at(int line) const { return name_ + ":" + std::to_string(line); }
 
+  std::vector<Eigen::Vector3d>& points() { return content_.faces.points; }
+
   void add_vertex(std::string_view rest) {
-    if (++vertex_count_ > 3 * limits_.triangles)
+    if (points().size() >= 3 * limits_.triangles)
       throw InputError(at(lines_.number()),
                        "the model has more points than the limit of " + std::to_string(3 * limits_.triangles));
-    std::array<std::string_view, 6> words;
-    std::size_t count = 0;
-    for (std::string_view word; count < 6 && !(word = take_word(rest)).empty();) words[count++] = word;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto number = i < count ? number_in<double>(words[i]) : std::nullopt;
-      if (!number) throw InputError(at(lines_.number()), "expected three coordinates after v");
-      if (!std::isfinite(*number)) words[i] = "9e37";  // out of range: its faces are dropped and counted
-    }
-    ((vertices_ += "v ").append(words[0]) += ' ').append(words[1]) += ' ';
-    vertices_.append(words[2]);
-    // Every point gets a color, as OpenMesh counts colors, not points.
-    bool is_colored = count == 6;
-    for (std::size_t i = 3; i < 6 && is_colored; ++i) {
-      const auto number = number_in<double>(words[i]);
-      is_colored = number && std::isfinite(*number);
-    }
-    if (is_colored) ++colored_count_;
-    for (std::size_t i = 3; i < 6; ++i) (vertices_ += ' ').append(is_colored ? words[i] : "1");
-    vertices_ += '\n';
+    std::array<std::optional<double>, 6> numbers;
+    for (auto& number : numbers) number = number_in<double>(take_word(rest));
+    if (!numbers[0] || !numbers[1] || !numbers[2])
+      throw InputError(at(lines_.number()), "expected three coordinates after v");
+    points().emplace_back(*numbers[0], *numbers[1], *numbers[2]);  // faces of what is not finite are dropped later
+    const auto is_channel = [](const std::optional<double>& number) { return number && std::isfinite(*number); };
+    const bool is_colored = std::all_of(numbers.begin() + 3, numbers.end(), is_channel);
+    colored_count_ += is_colored;
+    luminances_.push_back(is_colored ? luminance_of_srgb(*numbers[3], *numbers[4], *numbers[5]) : 1);
+  }
+
+  /// Colors belong to points in the file, to corners in the list of faces.
+  void set_colors() {
+    content_.faces.corner_luminance.reserve(content_.faces.corners.size());
+    for (const std::uint32_t corner : content_.faces.corners)
+      content_.faces.corner_luminance.push_back(luminances_[corner]);
   }
 
   void add_texture_vertex(std::string_view rest) {
-    ++texture_vertex_count_;
     const auto u = number_in<double>(take_word(rest));
     if (!u) throw InputError(at(lines_.number()), "expected a texture coordinate after vt");
     const auto v = number_in<double>(take_word(rest));
     const auto usable = [](double x) { return std::isfinite(x) && std::abs(x) < 1e30 ? x : 0.; };
-    vertices_ += "vt " + std::to_string(usable(*u)) + ' ' + std::to_string(usable(v.value_or(0))) + '\n';
+    texture_vertices_.emplace_back(usable(*u), usable(v.value_or(0)));
   }
 
   /// An index of the file (from 1, or from the last one back) to one from 1; 0 if there is no such entry yet.
@@ -158,11 +155,11 @@ class ObjPlainer {
                          "expected the index of a point, found '" + std::string(word.substr(0, 40)) + "'");
       std::string_view after = word.substr(std::min(slash + 1, word.size()));
       const auto t = number_in<long long>(after.substr(0, after.find('/')));
-      const std::size_t point = absolute(*v, vertex_count_);
-      const std::size_t uv = t ? absolute(*t, texture_vertex_count_) : 0;
+      const std::size_t point = absolute(*v, points().size());
+      const std::size_t uv = t ? absolute(*t, texture_vertices_.size()) : 0;
       is_good = is_good && point > 0;
       has_uv = has_uv && uv > 0;
-      // OpenMesh drops a point's second visit from a face, but not its texture coordinates: do both here.
+      // A point that a face visits twice is taken once: faces with spikes and bridges are common, and repaired so.
       const bool is_again = std::any_of(corners_.begin(), corners_.end(), [&](const auto& c) { return c[0] == point; });
       if (!is_again || !is_good) corners_.push_back({point, uv});
       if (corners_.size() > kCornerLimit)
@@ -176,22 +173,29 @@ class ObjPlainer {
       if (short_count_++ == 0) first_short_ = lines_.number();
       return;
     }
-    faces_ += 'f';
-    for (const auto& [point, uv] : corners_) {
-      (faces_ += ' ') += std::to_string(point);
-      if (has_uv) (faces_ += '/') += std::to_string(uv);
-    }
-    faces_ += '\n';
-    if (plain_.material_of_face.size() >= limits_.triangles)
+    if (content_.material_of_face.size() >= limits_.triangles)
       throw InputError(at(lines_.number()),
                        "the model has more faces than the limit of " + std::to_string(limits_.triangles));
-    plain_.material_of_face.push_back(material_);
+    content_.material_of_face.push_back(material_);
+    add_corners(has_uv);
+  }
+
+  /// Faces before the first one with texture coordinates have none, and so do faces with an index that has none.
+  void add_corners(bool has_uv) {
+    FaceList& faces = content_.faces;
+    if (has_uv) faces.corner_uv.resize(faces.corners.size(), Eigen::Vector2d::Zero());
+    for (const auto& [point, uv] : corners_) {
+      faces.corners.push_back(static_cast<std::uint32_t>(point - 1));
+      if (has_uv) faces.corner_uv.push_back(texture_vertices_[uv - 1]);
+    }
+    if (!faces.corner_uv.empty()) faces.corner_uv.resize(faces.corners.size(), Eigen::Vector2d::Zero());
+    faces.end_face();
   }
 
   void use_material(const std::string& material) {
-    const auto [found, is_new] = known_.try_emplace(material, static_cast<std::uint32_t>(plain_.materials.size()));
-    if (is_new) plain_.materials.push_back(material);
-    if (plain_.materials.size() > kMaterialLimit)
+    const auto [found, is_new] = known_.try_emplace(material, static_cast<std::uint32_t>(content_.materials.size()));
+    if (is_new) content_.materials.push_back(material);
+    if (content_.materials.size() > kMaterialLimit)
       throw InputError(at(lines_.number()),
                        "the model uses more than " + std::to_string(kMaterialLimit) + " materials");
     material_ = found->second;
@@ -203,11 +207,9 @@ class ObjPlainer {
   ObjLines lines_;
   const std::string& name_;
   const ModelLimits& limits_;
-  PlainObj plain_;
-  std::string vertices_;
-  std::string faces_;
-  std::size_t vertex_count_ = 0;
-  std::size_t texture_vertex_count_ = 0;
+  ObjContent content_;
+  std::vector<float> luminances_;  ///< of the points
+  std::vector<Eigen::Vector2d> texture_vertices_;
   std::size_t colored_count_ = 0;
   std::size_t dropped_count_ = 0;
   std::size_t short_count_ = 0;
@@ -264,10 +266,11 @@ void read_mtl(std::string_view text, std::map<std::string, MtlMaterial>& materia
 }
 
 /// Reads the libraries that are there; each mtllib line may name several.
-std::map<std::string, MtlMaterial> read_libraries(const PlainObj& plain, const std::string& name, ModelFolder& folder,
-                                                  std::vector<std::string>& warnings) {
+std::map<std::string, MtlMaterial> read_libraries(const ObjContent& content, const std::string& name,
+                                                  ModelFolder& folder, std::vector<std::string>& warnings) {
   std::map<std::string, MtlMaterial> materials;
-  for (const std::string& library : plain.libraries) {
+  std::set<std::string> files;  // each is read once, however often it is named
+  for (const std::string& library : content.libraries) {
     // A name may hold spaces, or the line several names.
     std::vector<std::string> names{library};
     if (!folder.find(folder.path(), library)) {
@@ -277,9 +280,9 @@ std::map<std::string, MtlMaterial> read_libraries(const PlainObj& plain, const s
     }
     for (const std::string& each : names) {
       const auto file = folder.find(folder.path(), each);
-      if (file)
+      if (file && files.insert(file->string()).second)
         read_mtl(folder.read(*file), materials);
-      else
+      else if (!file)
         warnings.push_back(name + ": the material file cannot be read (" + file.reason() + "); tried '" +
                            each.substr(0, 120) + "'");
     }
@@ -288,16 +291,16 @@ std::map<std::string, MtlMaterial> read_libraries(const PlainObj& plain, const s
 }
 
 /// One Look for each material that the faces use.
-std::vector<Look> looks_of(const PlainObj& plain, const std::string& name, ModelFolder& folder,
+std::vector<Look> looks_of(const ObjContent& content, const std::string& name, ModelFolder& folder,
                            const ImageReader& read_image, const ModelLimits& limits, MeshBuilder& builder,
                            std::vector<std::string>& warnings) {
-  const auto materials = read_libraries(plain, name, folder, warnings);
+  const auto materials = read_libraries(content, name, folder, warnings);
   std::map<std::string, int> textures;
-  std::size_t pixels_left = limits.image_pixels;
-  std::vector<Look> looks(plain.materials.size());
+  ModelImages images(folder, read_image, limits, builder);
+  std::vector<Look> looks(content.materials.size());
   for (std::size_t i = 0; i < looks.size(); ++i) {
     Look& look = looks[i];
-    look.name = plain.materials[i];
+    look.name = content.materials[i];
     const auto found = materials.find(look.name);
     if (found == materials.end()) continue;
     const MtlMaterial& material = found->second;
@@ -309,16 +312,12 @@ std::vector<Look> looks_of(const PlainObj& plain, const std::string& name, Model
     if (material.texture.empty()) continue;
     const auto [texture, is_new] = textures.try_emplace(material.texture, -1);
     if (is_new) {
-      const auto file = folder.find(folder.path(), material.texture);
-      if (auto image = file ? read_image(*file, pixels_left) : Failure{file.reason()}) {
-        pixels_left -= image->luminance.size();
-        image->name = folder.name(*file);
-        texture->second = builder.add_texture(std::move(*image));
-        folder.note(*file);
-      } else if (warnings.size() < 100) {
+      const auto image = images.open(folder.path(), material.texture);
+      if (image)
+        texture->second = *image;
+      else if (warnings.size() < 100)
         warnings.push_back(name + ": the texture cannot be read (" + image.reason() + "); tried '" +
                            material.texture.substr(0, 120) + "'");
-      }
     }
     look.texture = texture->second;
   }
@@ -357,26 +356,17 @@ std::vector<FaceList> split_by_material(const FaceList& faces, const std::vector
 
 Model load_obj(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
                const ModelLimits& limits) {
-  PlainObj plain = ObjPlainer(text, name, limits).run();
+  ObjContent content = ObjReader(text, name, limits).run();
   std::string().swap(text);
-  if (plain.material_of_face.empty()) {
-    const std::string cause = plain.warnings.empty() ? "" : "; " + plain.warnings.front();
+  if (content.material_of_face.empty()) {
+    const std::string cause = content.warnings.empty() ? "" : "; " + content.warnings.front();
     throw InputError(name, "there is no face in it" + cause);
   }
-  PolygonImporter importer(name, limits);
-  read_with_openmesh(std::move(plain.text), name, false, [&](std::istream& in) {
-    OpenMesh::IO::Options options = OpenMesh::IO::Options::FaceTexCoord;
-    if (plain.has_colors) options += OpenMesh::IO::Options::VertexColor;
-    return OpenMesh::IO::OBJReader().read(in, importer, options);
-  });
-  const FaceList faces = importer.take_polygons(1).faces;
-  CHECK_EQ(importer.n_faces(), plain.material_of_face.size());
-
   Model model;
-  model.warnings = std::move(plain.warnings);
+  model.warnings = std::move(content.warnings);
   MeshBuilder builder(limits);
-  const std::vector<Look> looks = looks_of(plain, name, folder, read_image, limits, builder, model.warnings);
-  const std::vector<FaceList> lists = split_by_material(faces, plain.material_of_face, looks.size());
+  const std::vector<Look> looks = looks_of(content, name, folder, read_image, limits, builder, model.warnings);
+  const std::vector<FaceList> lists = split_by_material(content.faces, content.material_of_face, looks.size());
   for (std::size_t m = 0; m < lists.size(); ++m)
     if (!lists[m].face_ends.empty()) builder.add(lists[m], Eigen::Affine3d::Identity(), looks[m]);
   model.mesh = builder.finish(model.warnings);

@@ -1,11 +1,14 @@
 #include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "sampling/base/input_error.h"
 #include "sampling/model/files/mesh_file.h"
+#include "sampling/model/files/polygon_list.h"
 #include "sampling/model/files/text_lines.h"
 
-/// OFF. OpenMesh's reader keeps what the last file's header said when it reads from memory, and knows no comments. A
-/// PLY with the same content is nearly the same text, so an OFF is rewritten as one, and read as one.
+/// OFF, as text. Vertices and faces may span lines; what follows one on its line is its color.
 namespace hilbrush {
 namespace {
 
@@ -13,14 +16,20 @@ namespace {
 class OffLines {
  public:
   OffLines(std::string_view text, const std::string& name) : text_(text), name_(name) {}
-  /// @throws InputError if there is none.
-  std::string_view next(const std::string& expected) {
+  /// Null at the end of the file.
+  std::optional<std::string_view> take() {
     while (const auto line = take_line(text_)) {
       ++number_;
       const std::string_view rest = trimmed(line->substr(0, line->find('#')));
       if (!rest.empty()) return rest;
     }
-    fail("expected " + expected + ", found the end of the file");
+    return std::nullopt;
+  }
+  /// @throws InputError if there is none.
+  std::string_view next(const std::string& expected) {
+    const auto line = take();
+    if (!line) fail("expected " + expected + ", found the end of the file");
+    return *line;
   }
   [[noreturn]] void fail(const std::string& sentence) const {
     throw InputError(name_ + ":" + std::to_string(number_), sentence);
@@ -34,7 +43,6 @@ class OffLines {
 
 struct Header {
   bool has_normals = false;
-  bool has_uv = false;
   std::size_t vertices = 0;
   std::size_t faces = 0;
 };
@@ -48,7 +56,6 @@ Header read_header(OffLines& lines, const ModelLimits& limits) {
   const std::string_view letters = line.substr(0, word_end);
   line.remove_prefix(word_end + 3);
   header.has_normals = letters.find('N') != letters.npos;
-  header.has_uv = letters.find("ST") != letters.npos;
   line = trimmed(line);
   if (line == "BINARY") lines.fail("binary OFF is not read; save it as text");
   // The counts may stand on the first line, too.
@@ -63,9 +70,36 @@ Header read_header(OffLines& lines, const ModelLimits& limits) {
   return header;
 }
 
-/// Color at the end of a line: three or four numbers, whole ones up to 255 or fractions up to 1. As three bytes; null
-/// if there is none.
-std::optional<std::array<int, 3>> read_color(std::string_view rest) {
+/// Numbers that may span lines.
+class OffNumbers {
+ public:
+  explicit OffNumbers(OffLines& lines) : lines_(lines) {}
+
+  /// @throws InputError with what was expected, which `describe` says.
+  template <class Number, class Describe>
+  Number take(const Describe& describe) {
+    std::string_view word = take_word(rest_);
+    if (word.empty()) {
+      const auto line = lines_.take();
+      if (!line) lines_.fail("expected " + describe() + ", found the end of the file");
+      rest_ = *line;
+      word = take_word(rest_);
+    }
+    const auto number = number_in<Number>(word);
+    if (!number) lines_.fail("expected " + describe() + ", found '" + std::string(word.substr(0, 40)) + "'");
+    return *number;
+  }
+  /// What is left of the line; the next number is looked for on the next one.
+  std::string_view take_rest() { return std::exchange(rest_, {}); }
+
+ private:
+  OffLines& lines_;
+  std::string_view rest_;
+};
+
+/// Color at the end of a line: three or four numbers, whole ones up to 255 or fractions up to 1. Its luminance; null if
+/// there is none.
+std::optional<float> read_color(std::string_view rest) {
   std::array<double, 3> channels{};
   bool is_fraction = false;
   for (double& channel : channels) {
@@ -75,82 +109,66 @@ std::optional<std::array<int, 3>> read_color(std::string_view rest) {
     is_fraction = is_fraction || word.find('.') != word.npos;
     channel = *number;
   }
-  std::array<int, 3> color{};
-  for (std::size_t i = 0; i < 3; ++i)
-    color[i] = static_cast<int>(is_fraction ? std::min(channels[i], 1.) * 255 + .5 : channels[i]);
-  return color;
+  for (double& channel : channels) channel /= is_fraction ? 1 : 255;
+  return luminance_of_srgb(channels[0], channels[1], channels[2]);
 }
 
-void append_color(std::string& text, const std::optional<std::array<int, 3>>& color) {
-  for (const int channel : color.value_or(std::array<int, 3>{255, 255, 255})) (text += ' ') += std::to_string(channel);
-  text += '\n';
+/// Notes the color of the entry number `index`; those before it that had none are white.
+void add_color(const std::optional<float>& luminance, std::size_t index, std::vector<float>& list) {
+  if (!luminance) return;
+  list.resize(index, 1);
+  list.push_back(*luminance);
 }
 
-/// Lines of a PLY's body, and whether any of them has a color of its own.
-struct PlyLines {
-  std::string text;
-  bool have_colors = false;
-};
-
-PlyLines vertex_lines(OffLines& lines, const Header& header) {
-  PlyLines vertices;
+void read_vertices(OffLines& lines, const Header& header, PolygonList& polygons) {
+  OffNumbers numbers(lines);
   for (std::size_t i = 0; i < header.vertices; ++i) {
-    std::string_view line = lines.next("vertex " + std::to_string(i + 1) + " of " + std::to_string(header.vertices));
-    for (int c = 0; c < 3; ++c) {
-      const std::string_view word = take_word(line);
-      const auto number = number_in<double>(word);
-      if (!number) lines.fail("expected three coordinates");
-      vertices.text.append(std::isfinite(*number) ? word : "9e37") += ' ';  // out of range: its faces are dropped
-    }
-    for (int c = 0; header.has_normals && c < 3; ++c) take_word(line);
-    const auto color = read_color(line);
-    vertices.have_colors = vertices.have_colors || color;
-    append_color(vertices.text, color);
+    const auto vertex = [&] { return "vertex " + std::to_string(i + 1) + " of " + std::to_string(header.vertices); };
+    Eigen::Vector3d p;
+    for (double& coordinate : p) coordinate = numbers.take<double>(vertex);
+    polygons.points.push_back(p);
+    std::string_view rest = numbers.take_rest();
+    for (int c = 0; header.has_normals && c < 3; ++c) take_word(rest);
+    add_color(read_color(rest), i, polygons.point_luminance);
   }
-  return vertices;
+  if (!polygons.point_luminance.empty()) polygons.point_luminance.resize(header.vertices, 1);
 }
 
-PlyLines face_lines(OffLines& lines, const Header& header) {
-  PlyLines faces;
+void read_faces(OffLines& lines, const Header& header, const std::string& name, const ModelLimits& limits,
+                PolygonList& polygons) {
+  OffNumbers numbers(lines);
   for (std::size_t i = 0; i < header.faces; ++i) {
-    std::string_view line = lines.next("face " + std::to_string(i + 1) + " of " + std::to_string(header.faces));
-    const auto count = number_in<std::uint32_t>(take_word(line));
-    if (!count) lines.fail("expected the number of the face's corners");
-    faces.text += std::to_string(*count);
-    for (std::uint32_t c = 0; c < *count; ++c) {
-      const auto index = number_in<std::uint32_t>(take_word(line));
-      if (!index) lines.fail("expected the indices of the face's " + std::to_string(*count) + " corners");
-      (faces.text += ' ') += std::to_string(*index);
-    }
-    const auto color = read_color(line);
-    faces.have_colors = faces.have_colors || color;
-    append_color(faces.text, color);
+    const auto face = [&] { return "face " + std::to_string(i + 1) + " of " + std::to_string(header.faces); };
+    const auto count = numbers.take<std::uint32_t>(face);
+    polygons.check_room(count, name, limits);
+    const auto corners = [&] { return "the indices of the " + std::to_string(count) + " corners of " + face(); };
+    for (std::uint32_t c = 0; c < count; ++c) polygons.corners.push_back(numbers.take<std::uint32_t>(corners));
+    polygons.face_ends.push_back(polygons.corners.size());
+    add_color(read_color(numbers.take_rest()), i, polygons.face_luminance);
   }
-  return faces;
-}
-
-/// Colors that no line has must not look like white ones: they get names that are not read.
-std::string color_properties(bool have_colors) {
-  return have_colors ? "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                     : "property uchar skip1\nproperty uchar skip2\nproperty uchar skip3\n";
 }
 
 }  // namespace
 
-Model load_off(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
-               const ModelLimits& limits) {
+Model load_off(std::string text, const std::string& name, const ModelLimits& limits) {
   OffLines lines(text, name);
   const Header header = read_header(lines, limits);
-  const PlyLines vertices = vertex_lines(lines, header);
-  const PlyLines faces = face_lines(lines, header);
+  PolygonList polygons;
+  read_vertices(lines, header, polygons);
+  read_faces(lines, header, name, limits, polygons);
   std::string().swap(text);
-  std::string ply = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(header.vertices) +
-                    "\nproperty float x\nproperty float y\nproperty float z\n" +
-                    color_properties(vertices.have_colors) + "element face " + std::to_string(header.faces) +
-                    "\nproperty list int uint vertex_indices\n" + color_properties(faces.have_colors) + "end_header\n";
-  ply += vertices.text;
-  ply += faces.text;
-  return load_ply(std::move(ply), name, folder, read_image, limits);
+  Model model;
+  model.up = UpAxis::kZ;
+  std::size_t dropped = 0;
+  const FaceList faces = polygons.take_faces(name, dropped);
+  if (dropped > 0)
+    model.warnings.push_back(name + ": " + std::to_string(dropped) +
+                             " faces were dropped: they name points that do not exist");
+  MeshBuilder builder(limits);
+  builder.add(faces, Eigen::Affine3d::Identity(), Look());
+  model.mesh = builder.finish(model.warnings);
+  if (model.mesh.triangles.empty()) throw InputError(name, "there is no usable face in it");
+  return model;
 }
 
 }  // namespace hilbrush

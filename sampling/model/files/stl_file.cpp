@@ -1,20 +1,22 @@
-#include <OpenMesh/Core/IO/reader/STLReader.hh>
-#include <cstring>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <functional>
+#include <unordered_map>
 
 #include "sampling/base/input_error.h"
+#include "sampling/model/files/face_list.h"
 #include "sampling/model/files/mesh_file.h"
-#include "sampling/model/files/openmesh_reading.h"
-#include "sampling/model/files/polygon_importer.h"
 #include "sampling/model/files/text_lines.h"
 
-/// STL. OpenMesh believes the count of a binary file, and any line of an ASCII one that holds "outer"; a coordinate
-/// that is not a number breaks the map it welds points with. So the text is put into plain form, and triangles that are
-/// not finite are taken out.
+/// STL. A binary file's count is checked against its size; triangles that are not finite are left out and counted.
 namespace hilbrush {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 80;
 constexpr std::size_t kTriangleBytes = 50;
+constexpr std::size_t kNormalBytes = 12;
 
 std::uint32_t count_of(const std::string& bytes) {
   std::uint32_t count = 0;
@@ -31,8 +33,56 @@ bool is_binary(const std::string& bytes) {
   return lower_case(take_word(head)) != "solid";
 }
 
-/// Removes triangles that are not finite; returns how many.
-std::size_t clean_binary(std::string& bytes, const std::string& name, const ModelLimits& limits) {
+/// Gathers triangles. Every corner has coordinates of its own in the file: equal ones become one point.
+class TriangleList {
+ public:
+  using Corners = std::array<Eigen::Vector3d, 3>;
+
+  void add(const Corners& corners) {
+    const auto is_usable = [](const Eigen::Vector3d& p) {
+      return p.allFinite() && p.cwiseAbs().maxCoeff() < kMaxCoordinate;
+    };
+    if (!std::ranges::all_of(corners, is_usable)) {
+      ++dropped_;
+      return;
+    }
+    for (const Eigen::Vector3d& p : corners) faces_.corners.push_back(index_of(p));
+    faces_.end_face();
+  }
+  std::size_t count() const { return faces_.face_ends.size() + dropped_; }
+  std::size_t dropped() const { return dropped_; }
+  FaceList take(const std::string& name) {
+    faces_.at = name;
+    return std::move(faces_);
+  }
+
+ private:
+  struct Hash {
+    std::size_t operator()(const std::array<double, 3>& p) const {
+      return std::hash<std::string_view>()({reinterpret_cast<const char*>(p.data()), sizeof p});
+    }
+  };
+
+  std::uint32_t index_of(const Eigen::Vector3d& p) {
+    const Eigen::Vector3d unsigned_zero = p + Eigen::Vector3d::Zero();  // -0 becomes +0
+    const auto [found, is_new] = index_.try_emplace({unsigned_zero.x(), unsigned_zero.y(), unsigned_zero.z()},
+                                                    static_cast<std::uint32_t>(faces_.points.size()));
+    if (is_new) faces_.points.push_back(p);
+    return found->second;
+  }
+
+  FaceList faces_;
+  std::unordered_map<std::array<double, 3>, std::uint32_t, Hash> index_;
+  std::size_t dropped_ = 0;
+};
+
+float float_at(const char* bytes) {
+  std::uint32_t bits = 0;
+  for (int i = 3; i >= 0; --i) bits = bits << 8 | static_cast<unsigned char>(bytes[i]);
+  return std::bit_cast<float>(bits);
+}
+
+void read_binary(const std::string& bytes, const std::string& name, const ModelLimits& limits, TriangleList& list) {
   const std::size_t count = count_of(bytes);
   const std::size_t there = (bytes.size() - kHeaderBytes - 4) / kTriangleBytes;
   if (count > there)
@@ -40,37 +90,30 @@ std::size_t clean_binary(std::string& bytes, const std::string& name, const Mode
         name, "its header promises " + std::to_string(count) + " triangles, the file holds " + std::to_string(there));
   if (count > limits.triangles)
     throw InputError(name, "the model has more triangles than the limit of " + std::to_string(limits.triangles));
-  std::size_t kept = 0;
   for (std::size_t t = 0; t < count; ++t) {
-    const char* triangle = bytes.data() + kHeaderBytes + 4 + kTriangleBytes * t;
-    std::array<float, 12> numbers{};
-    std::memcpy(numbers.data(), triangle, sizeof numbers);
-    bool is_finite = true;
-    for (std::size_t i = 3; i < 12; ++i) is_finite = is_finite && std::isfinite(numbers[i]);
-    if (!is_finite) continue;
-    std::memmove(bytes.data() + kHeaderBytes + 4 + kTriangleBytes * kept, triangle, kTriangleBytes);
-    ++kept;
+    const char* corner = bytes.data() + kHeaderBytes + 4 + kTriangleBytes * t + kNormalBytes;
+    TriangleList::Corners corners;
+    for (Eigen::Vector3d& p : corners) {
+      p = {float_at(corner), float_at(corner + 4), float_at(corner + 8)};
+      corner += 12;
+    }
+    list.add(corners);
   }
-  bytes.resize(kHeaderBytes + 4 + kTriangleBytes * kept);
-  for (std::size_t i = 0; i < 4; ++i) bytes[kHeaderBytes + i] = static_cast<char>(kept >> (8 * i) & 255u);
-  return count - kept;
 }
 
-/// Puts an ASCII file into the form that OpenMesh looks for. Triangles that are not finite are left out and counted.
+/// Reads an ASCII file.
 class AsciiStlReader {
  public:
-  AsciiStlReader(std::string_view text, const std::string& name, const ModelLimits& limits)
-      : text_(text), name_(name), limits_(limits) {}
+  AsciiStlReader(std::string_view text, const std::string& name, const ModelLimits& limits, TriangleList& list)
+      : text_(text), name_(name), limits_(limits), list_(list) {}
 
-  std::string read() {
+  void read() {
     while (const auto line = take_line(text_)) {
       ++line_number_;
       read_line(*line);
     }
     if (corners_ > 0) fail("the file ends inside a facet");
-    return std::move(plain_);
   }
-  std::size_t dropped() const { return dropped_; }
 
  private:
   [[noreturn]] void fail(const std::string& sentence) const {
@@ -80,9 +123,7 @@ class AsciiStlReader {
   void read_line(std::string_view line) {
     const std::string key = lower_case(take_word(line));
     if (key == "outer") {
-      triangle_.clear();
       corners_ = 0;
-      is_finite_ = true;
     } else if (key == "vertex") {
       add_corner(line);
     } else if (key == "endloop") {
@@ -94,66 +135,47 @@ class AsciiStlReader {
   }
 
   void add_corner(std::string_view coordinates) {
-    if (++corners_ > 3) fail("a facet has more than three corners");
-    triangle_ += "vertex";
-    for (int i = 0; i < 3; ++i) {
-      const std::string_view word = take_word(coordinates);
-      const auto value = number_in<double>(word);
+    if (corners_ == 3) fail("a facet has more than three corners");
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto value = number_in<double>(take_word(coordinates));
       if (!value) fail("expected three coordinates after vertex");
-      is_finite_ = is_finite_ && std::abs(*value) < kMaxCoordinate;
-      (triangle_ += ' ').append(word);
+      triangle_[corners_][axis] = *value;
     }
-    triangle_ += '\n';
+    ++corners_;
   }
 
   void end_triangle() {
     if (corners_ != 3) fail("a facet has " + std::to_string(corners_) + " corners, not three");
     corners_ = 0;
-    if (!is_finite_) {
-      ++dropped_;
-      return;
-    }
-    if (++count_ > limits_.triangles)
+    if (list_.count() >= limits_.triangles)
       fail("the model has more triangles than the limit of " + std::to_string(limits_.triangles));
-    (plain_ += "outer loop\n") += triangle_;
+    list_.add(triangle_);
   }
 
   std::string_view text_;
   const std::string& name_;
   const ModelLimits& limits_;
-  std::string plain_;
-  std::string triangle_;
-  std::size_t count_ = 0;
-  std::size_t dropped_ = 0;
+  TriangleList& list_;
+  TriangleList::Corners triangle_;
+  std::size_t corners_ = 0;
   int line_number_ = 0;
-  int corners_ = 0;
-  bool is_finite_ = true;
 };
 
 }  // namespace
 
 Model load_stl(std::string text, const std::string& name, const ModelLimits& limits) {
-  std::size_t not_finite = 0;
-  const bool binary = is_binary(text);
-  if (binary) {
-    not_finite = clean_binary(text, name, limits);
-  } else {
-    AsciiStlReader reader(text, name, limits);
-    text = reader.read();
-    not_finite = reader.dropped();
-  }
-
-  PolygonImporter importer(name, limits);
-  read_with_openmesh(std::move(text), name, binary, [&](std::istream& in) {
-    OpenMesh::IO::Options options = binary ? OpenMesh::IO::Options::Binary : OpenMesh::IO::Options::Default;
-    return OpenMesh::IO::STLReader().read(in, importer, options);
-  });
+  TriangleList list;
+  if (is_binary(text))
+    read_binary(text, name, limits, list);
+  else
+    AsciiStlReader(text, name, limits, list).read();
+  std::string().swap(text);
   Model model;
   model.up = UpAxis::kZ;
-  if (not_finite > 0)
-    model.warnings.push_back(name + ": " + std::to_string(not_finite) +
+  if (list.dropped() > 0)
+    model.warnings.push_back(name + ": " + std::to_string(list.dropped()) +
                              " triangles with coordinates out of range were dropped");
-  const FaceList faces = importer.take_polygons(1).faces;
+  const FaceList faces = list.take(name);
   MeshBuilder builder(limits);
   builder.add(faces, Eigen::Affine3d::Identity(), Look());
   model.mesh = builder.finish(model.warnings);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
+#include <initializer_list>
 
 #include "sampling/model/files/face_list.h"
 #include "tests/sampling/model/model_on_disk.h"
@@ -52,6 +54,13 @@ TEST(ObjFile, KeepsFacesThatDoNotFitTogether) {
       disk.load("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\nf 1 2 5\n");
   EXPECT_EQ(model.mesh.triangle_count(), 4u);
   EXPECT_EQ(model.mesh.vertices.size(), 5u);
+}
+
+TEST(ObjFile, IsReadInDoublePrecision) {
+  const ModelOnDisk disk;
+  const Model model = disk.load("m.obj", "v 1000000 0 0\nv 1000000.000000001 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_EQ(model.mesh.corner(0, 0).x(), 1e6);
+  EXPECT_EQ(model.mesh.corner(0, 1).x(), 1e6 + 1e-9);
 }
 
 TEST(ObjFile, ReadsColorsOfPoints) {
@@ -161,6 +170,64 @@ TEST(PlyFile, ReadsEveryTypeThatCountsLists) {
     text.replace(text.find("uchar int"), 5, count);
     EXPECT_EQ(disk.load("m.ply", text).mesh.triangle_count(), 1u) << count;
   }
+}
+
+/// Numbers as a binary file has them.
+template <class Number>
+std::string bytes_of(std::initializer_list<Number> numbers, bool is_big_endian = false) {
+  std::string out;
+  for (const Number number : numbers) {
+    std::string bytes(reinterpret_cast<const char*>(&number), sizeof number);
+    if (is_big_endian) std::reverse(bytes.begin(), bytes.end());
+    out += bytes;
+  }
+  return out;
+}
+
+TEST(PlyFile, ReadsBinaryInBothByteOrdersAndDoublePrecision) {
+  const ModelOnDisk disk;
+  for (const bool is_big : {false, true}) {
+    const std::string header = std::string("ply\nformat ") + (is_big ? "binary_big_endian" : "binary_little_endian") +
+                               " 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+                               "property ushort red\nproperty ushort green\nproperty ushort blue\n"
+                               "element extra 1\nproperty list uchar short skipped\nproperty int more\n"
+                               "element face 1\nproperty list uchar int vertex_index\nend_header\n";
+    std::string body;
+    for (const auto& p : {Vector3d(1e6, 0, 0), Vector3d(1e6 + 1e-9, 0, 0), Vector3d(0, 1, 0)})
+      body += bytes_of({p.x(), p.y(), p.z()}, is_big) + bytes_of<std::uint16_t>({0, 65535, 0}, is_big);
+    body += bytes_of<std::uint8_t>({2}) + bytes_of<std::int16_t>({-5, 7}, is_big) + bytes_of<std::int32_t>({9}, is_big);
+    body += bytes_of<std::uint8_t>({3}) + bytes_of<std::int32_t>({0, 1, 2}, is_big);
+    const Model model = disk.load("m.ply", header + body);
+    ASSERT_EQ(model.mesh.triangle_count(), 1u);
+    EXPECT_EQ(model.mesh.corner(0, 1).x(), 1e6 + 1e-9);
+    EXPECT_NEAR(model.mesh.corner_luminance[0][0], .7152, 1e-6);
+    EXPECT_NE(disk.refusal("m.ply", header + body.substr(0, body.size() - 1)), "");
+  }
+}
+
+TEST(PlyFile, ReadsColorsInFloatingPointOfBothSizes) {
+  const ModelOnDisk disk;
+  for (const std::string type : {"float", "double"}) {
+    std::string rgb;
+    for (const char* channel : {"red", "green", "blue"}) rgb += "property " + type + " " + channel + "\n";
+    const Model model =
+        disk.load("m.ply", ply(rgb, "", "0 0 0 .5 .5 .5\n1 0 0 0 1 0\n0 1 0 0 0 1\n0 0 1 0 0 0\n3 0 1 2\n"));
+    EXPECT_NEAR(model.mesh.corner_luminance[0][0], .21404, 1e-4) << type;
+    EXPECT_NEAR(model.mesh.corner_luminance[0][1], .7152, 1e-4) << type;
+  }
+}
+
+TEST(PlyFile, ReadsTriangleStripsThatMinusOneEnds) {
+  const ModelOnDisk disk;
+  std::string text = ply("", "", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n12 0 1 2 3 -1 2 1 3 0 0 -1 2\n");
+  const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+  text.replace(text.find(faces), faces.size(), "element tristrips 1\nproperty list int int vertex_indices\n");
+  const Model model = disk.load("m.ply", text);
+  ASSERT_EQ(model.mesh.triangle_count(), 4u);
+  EXPECT_GT(model.mesh.area_vector(0).z(), 0);
+  EXPECT_GT(model.mesh.area_vector(1).z(), 0) << "every second triangle of a strip is the other way around";
+  EXPECT_GT(model.mesh.area_vector(2).z(), 0) << "a strip after -1 begins with its own orientation";
+  EXPECT_LT(model.mesh.area_vector(3).z(), 0);
 }
 
 TEST(PlyFile, BelievesNoCount) {
