@@ -228,4 +228,14 @@ Json job_to_json(const Job& job) {
   return json;
 }
 
+std::size_t job_json_bytes(const Job& job) {
+  constexpr std::size_t kKeyBytes = 900;   // of all keys, with their punctuation
+  constexpr std::size_t kIndexBytes = 11;  // of a dot in doubt, at most
+  std::size_t bytes = kKeyBytes + job.settings.size() + job.plan.size() + job.measured.size() + job.key.size() +
+                      job.model.native().size() + job.model_copy.native().size() + job.folder.native().size() +
+                      kIndexBytes * std::min(job.in_doubt.size(), kListedInDoubtMax);
+  for (const std::string& warning : job.warnings) bytes += warning.size();
+  return job.error ? bytes + job.error->at.size() + job.error->message.size() : bytes;
+}
+
 }  // namespace hilbrush

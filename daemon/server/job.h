@@ -63,7 +63,7 @@ struct Job {
   std::vector<std::string> warnings;  ///< of the pipeline, the first kWarningsMax
   /// What an operator should see before painting, of the report: a JSON object as text, or empty. See plan_of_report().
   std::string plan;
-  std::string model_sha256;           ///< over the copied files, as programs name it
+  std::string model_sha256;  ///< over the copied files, as programs name it
   std::string settings_sha256;
 
   /// The wall time that Hilbrush itself adds to each dot, of this daemon's life or the last one known.
@@ -104,5 +104,7 @@ Json plan_of_report(const Json& report);
 
 /// The job object of the protocol. At most 1000 in-doubt dots are listed; dots.in_doubt counts them all.
 Json job_to_json(const Job& job);
+/// About what that takes as text.
+std::size_t job_json_bytes(const Job& job);
 
 }  // namespace hilbrush

@@ -23,6 +23,14 @@ void write_record(const Job& job) {
   fs::rename(part, file);
 }
 
+/// Empty if it cannot be read, or is not a file: a pipe would be waited for.
+std::string record_text(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return {};
+  std::ifstream in(file);
+  return std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+}
+
 bool is_job_number(const std::string& text) {
   constexpr std::size_t kDigitsMax = 18;  // of an int64_t
   return !text.empty() && text.size() <= kDigitsMax && text.find_first_not_of("0123456789") == std::string::npos;
@@ -60,13 +68,36 @@ void JobQueue::progressed(Job& job) {
 }
 
 /// A store that cannot be written must not keep a cell from being stopped or a dot from being counted: the journal has
-/// what matters, and the next change writes again.
+/// what matters, and what could not be written is written later.
 void JobQueue::keep(const Job& job) {
   try {
     store_.update(job);
     write_record(job);
-    store_fault_.clear();
+    unkept_.erase(job.id);
+    if (unkept_.empty()) store_fault_.clear();
   } catch (const std::exception& error) {
+    unkept_.insert(job.id);
+    store_fault_ = std::string("jobs cannot be stored: ") + error.what();
+  }
+}
+
+void JobQueue::keep_unkept() {
+  const std::vector<std::int64_t> ids(unkept_.begin(), unkept_.end());
+  for (const std::int64_t id : ids) {
+    if (const Job* job = find(id))
+      keep(*job);
+    else
+      unkept_.erase(id);
+    if (unkept_.contains(id)) return;  // still not: no use in trying the others
+  }
+  if (unkept_.empty()) store_fault_.clear();
+}
+
+void JobQueue::keep_ranks(const std::vector<std::pair<std::int64_t, std::int64_t>>& job_ranks) {
+  try {
+    store_.set_ranks(job_ranks);
+  } catch (const std::exception& error) {
+    for (const auto& [id, rank] : job_ranks) unkept_.insert(id);
     store_fault_ = std::string("jobs cannot be stored: ") + error.what();
   }
 }
@@ -91,9 +122,9 @@ void JobQueue::forget_oldest(const Job& spared) {
       std::count_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return is_final(entry.second.state); });
   if (static_cast<std::size_t>(count) <= kHistoryMax) return;
   const auto oldest = std::find_if(jobs_.begin(), jobs_.end(), [&](const auto& entry) {
-    return is_final(entry.second.state) && &entry.second != &spared;
+    return is_final(entry.second.state) && &entry.second != &spared && !unkept_.contains(entry.first);
   });
-  jobs_.erase(oldest);
+  if (oldest != jobs_.end()) jobs_.erase(oldest);
 }
 
 /// By the records in the jobs' folders.
@@ -104,9 +135,7 @@ std::string JobQueue::find_lost_jobs() {
   for (const auto& entry : fs::directory_iterator(jobs_folder_, error)) {
     const std::string name = entry.path().filename().string();
     if (!is_job_number(name)) continue;
-    std::ifstream in(entry.path() / "job.json");
-    const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-    const std::optional<Job> job = job_from_record(text);
+    const std::optional<Job> job = job_from_record(record_text(entry.path() / "job.json"));
     const bool is_found = job && job->id == std::stoll(name);
     store_.insert_with_id(is_found ? *job : lost_job(entry.path()));
     ++(is_found ? found : lost);
@@ -178,17 +207,20 @@ Job& JobQueue::move(const std::string& id, int position) {
   std::erase(order, &job);
   const auto index = std::min(order.size(), static_cast<std::size_t>(position - 1));
   order.insert(order.begin() + static_cast<std::ptrdiff_t>(index), &job);
-  std::int64_t rank = 0;
   std::vector<std::int64_t> ranks;
   for (const Job* waiting : order) ranks.push_back(waiting->rank);
   std::sort(ranks.begin(), ranks.end());
+  std::int64_t rank = 0;
+  std::vector<std::pair<std::int64_t, std::int64_t>> job_ranks;
   for (std::size_t i = 0; i < order.size(); ++i) {
     rank = std::max(rank + 1, ranks[i]);
     Job& moved = jobs_.at(order[i]->id);
-    if (moved.rank == rank) continue;
-    moved.rank = rank;
-    if (&moved != &job) changed(moved);
+    if (std::exchange(moved.rank, rank) != rank) job_ranks.emplace_back(moved.id, rank);
   }
+  keep_ranks(job_ranks);
+  update_positions();
+  for (const auto& [moved, new_rank] : job_ranks)
+    if (moved != job.id) progressed(jobs_.at(moved));
   changed(job);
   return job;
 }

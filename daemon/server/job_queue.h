@@ -4,7 +4,9 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/server/job.h"
@@ -21,6 +23,8 @@ namespace hilbrush {
 
 class JobQueue {
  public:
+  /// Jobs that wait; further ones are refused, because every change of the order touches all of them.
+  static constexpr std::size_t kWaitingMax = 1000;
   /// Final jobs in memory; older ones are read from the store when asked for.
   static constexpr std::size_t kHistoryMax = 1000;
 
@@ -52,8 +56,10 @@ class JobQueue {
   void changed(Job& job);
   /// Only what is not stored was changed, such as progress: watchers are notified.
   void progressed(Job& job);
-  /// Stores the job and nothing else.
+  /// Stores the job and nothing else. If that fails, keep_unkept() tries again.
   void keep(const Job& job);
+  /// Stores what could not be stored before. Call now and then.
+  void keep_unkept();
   /// Why the store cannot be written, or empty: jobs go on, and are stored when it works again.
   const std::string& store_fault() const { return store_fault_; }
 
@@ -61,6 +67,7 @@ class JobQueue {
   std::function<void(const Job&)> on_change;
 
  private:
+  void keep_ranks(const std::vector<std::pair<std::int64_t, std::int64_t>>& job_ranks);
   void update_positions();
   void forget_oldest(const Job& spared);
   std::string find_lost_jobs();
@@ -68,7 +75,8 @@ class JobQueue {
   const std::filesystem::path jobs_folder_;
   JobStore& store_;
   std::map<std::int64_t, Job> jobs_;
-  std::optional<Job> archived_;  ///< the last job that was asked for and is no longer in jobs_
+  std::optional<Job> archived_;    ///< the last job that was asked for and is no longer in jobs_
+  std::set<std::int64_t> unkept_;  ///< jobs that the store does not have as they are
   std::string store_fault_;
 };
 

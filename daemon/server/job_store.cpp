@@ -1,6 +1,7 @@
 #include "daemon/server/job_store.h"
 
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
 
 #include <array>
 #include <chrono>
@@ -62,6 +63,16 @@ std::string marks() {
   return text;
 }
 
+/// The file holds no jobs that could be used: it may be set aside. All other faults, such as a full disk or missing
+/// rights, leave it as it is.
+struct DamagedStore : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+bool is_damage(const SQLite::Exception& error) {
+  return error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
+}
+
 void migrate(SQLite::Database& database) {
   const int version = database.execAndGet("PRAGMA user_version").getInt();
   if (version > static_cast<int>(kMigrations.size()))
@@ -78,7 +89,7 @@ std::unique_ptr<SQLite::Database> open_checked(const std::filesystem::path& file
   auto database = std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   database->setBusyTimeout(2000);
   if (const std::string answer = database->execAndGet("PRAGMA quick_check").getString(); answer != "ok")
-    throw std::runtime_error("it is damaged: " + answer);
+    throw DamagedStore("it is damaged: " + answer);
   database->exec("PRAGMA journal_mode = WAL");
   // No sync a commit: the socket thread must not wait for a disk. What a power cut may take of a job's state, its
   // journal still knows.
@@ -199,16 +210,25 @@ struct JobStore::Implementation {
 
 JobStore::JobStore(const std::filesystem::path& file) : implementation_(std::make_unique<Implementation>()) {
   is_new_ = !std::filesystem::exists(file);
+  const auto set_aside = [&](const std::string& why) {
+    const auto aside = set_file_aside(file);
+    is_new_ = true;
+    notice_ = file.string() + " cannot be used (" + why + "); it was set aside as " + aside.filename().string() +
+              ", and the jobs are taken from the records in their folders";
+  };
+  const auto refuse = [&](const std::exception& error) {
+    throw std::runtime_error(file.string() + ": the job store cannot be used: " + error.what());
+  };
   try {
     implementation_->database = open_checked(file);
     return;
+  } catch (const DamagedStore& error) {
+    set_aside(error.what());
+  } catch (const SQLite::Exception& error) {
+    if (!is_damage(error)) refuse(error);
+    set_aside(error.what());
   } catch (const std::exception& error) {
-    if (!std::filesystem::exists(file))
-      throw std::runtime_error(file.string() + ": no job store can be made: " + error.what());
-    const auto aside = set_file_aside(file);
-    is_new_ = true;
-    notice_ = file.string() + " cannot be used (" + error.what() + "); it was set aside as " +
-              aside.filename().string() + ", and the jobs are taken from the records in their folders";
+    refuse(error);
   }
   try {
     implementation_->database = open_checked(file);
@@ -241,6 +261,18 @@ void JobStore::update(const Job& job) {
   bind(statement, job);
   statement.bind(kColumnCount + 1, job.id);
   statement.exec();
+}
+
+void JobStore::set_ranks(const std::vector<std::pair<std::int64_t, std::int64_t>>& job_ranks) {
+  SQLite::Transaction transaction(*implementation_->database);
+  SQLite::Statement statement(*implementation_->database, "UPDATE job SET rank = ? WHERE id = ?");
+  for (const auto& [job, rank] : job_ranks) {
+    statement.bind(1, rank);
+    statement.bind(2, job);
+    statement.exec();
+    statement.reset();
+  }
+  transaction.commit();
 }
 
 std::vector<Job> JobStore::load_recent(std::size_t final_count) {

@@ -30,6 +30,8 @@ class JobStore {
   /// Under the id it has; nothing happens if that, or its key, is taken.
   void insert_with_id(const Job& job);
   void update(const Job& job);
+  /// Places in the queue, and nothing else, all at once.
+  void set_ranks(const std::vector<std::pair<std::int64_t, std::int64_t>>& job_ranks);
   /// All that are not final, and the latest `final_count` that are; ascending ids.
   std::vector<Job> load_recent(std::size_t final_count);
   std::optional<Job> find(std::int64_t id);
