@@ -28,6 +28,11 @@ struct JobFilesFault : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The job is to be painted by a daemon with another cell.
+struct OtherCellFault : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 std::string program_sha256(const std::filesystem::path& file) {
   Sha256 hash;
   if (!hash.update_from_file(file)) throw JobFilesFault(file.string() + ": cannot be read");
@@ -46,9 +51,12 @@ void sync_file_system(const std::filesystem::path& folder) {
 
 void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
   const Provenance wanted{order.model_sha256, order.settings_sha256, description.sha256, HILBRUSH_VERSION};
+  if (found.cell_sha256 != wanted.cell_sha256)
+    throw OtherCellFault("the program was made for another cell than \"" + description.name +
+                         "\" as its file is now: start the daemon with the cell file that it was made for");
   const std::string mismatch = provenance_mismatch(found, wanted);
   if (!mismatch.empty())
-    throw JobFilesFault("the program was made for " + mismatch + "; a program is never run on another cell or model");
+    throw JobFilesFault("the program was made for " + mismatch + "; a program is never run on another model");
   if (found.version != wanted.version)
     throw JobFilesFault("the program was made by version " + found.version + " of hilbrush, and this is " +
                         wanted.version + ": submit the model again");
@@ -167,7 +175,7 @@ void CellThread::act(std::function<void()> work, OnActEnd on_end) {
           work();
           return std::nullopt;
         } catch (const std::exception& error) {
-          return CellFault{error.what(), false};
+          return CellFault{error.what()};
         }
       },
       std::move(on_end));
@@ -309,7 +317,8 @@ void CellThread::prepare(PaintOrder wanted, std::function<void(Prepared)> on_end
           prepared.from = loaded_->from = true_joints();
         } catch (const std::exception& error) {
           loaded_.reset();
-          prepared.fault = CellFault{error.what(), dynamic_cast<const JobFilesFault*>(&error) != nullptr};
+          prepared.fault = CellFault{error.what(), dynamic_cast<const JobFilesFault*>(&error) != nullptr,
+                                     dynamic_cast<const OtherCellFault*>(&error) != nullptr};
         }
         return prepared;
       },

@@ -45,6 +45,7 @@ struct PaintTally {
 struct CellFault {
   std::string sentence;
   bool is_program_at_fault = false;  ///< the job's files are at fault, not the cell
+  bool is_for_another_cell = false;  ///< nothing is at fault: the daemon runs another cell than the job was made for
 };
 
 struct Prepared {

@@ -173,6 +173,7 @@ void JobPainting::begin_run(Job& job, bool exposes_in_doubt) {
 
 void JobPainting::approach(const Prepared& prepared) {
   Job& job = *queue_.find(run_->job);
+  if (prepared.fault && prepared.fault->is_for_another_cell) return keep_for_its_cell(job, *prepared.fault);
   if (prepared.fault)
     return end_run_before_painting(thread_.is_stop_latched() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed,
                                    *prepared.fault);
@@ -321,6 +322,17 @@ void JobPainting::end_run_before_painting(ExecutionOutcome outcome, const CellFa
   result.is_program_at_fault = why.is_program_at_fault;
   const Job& job = *queue_.find(run_->job);
   finish_run(result, {job.exposed, job.in_doubt});
+}
+
+/// The job stays what it was, for a daemon with its cell; a cancel is carried out.
+void JobPainting::keep_for_its_cell(Job& job, const CellFault& why) {
+  const bool is_cancelled = run_->is_cancelled;
+  run_.reset();
+  job.stage.clear();
+  job.state = is_cancelled ? JobState::kCancelled : job.is_begun ? JobState::kPaused : JobState::kReady;
+  if (!is_cancelled) job.error = JobError{"program.ply", why.sentence};
+  controller_.end_painting(job.state == JobState::kPaused);
+  queue_.changed(job);
 }
 
 void JobPainting::handle_stop() {

@@ -56,6 +56,7 @@ class JobPainting {
   void paint(std::vector<Joints> approach);
   void note_progress(std::size_t exposed);
   void finish_run(const ExecutionResult& result, const PaintTally& tally);
+  void keep_for_its_cell(Job& job, const CellFault& why);
   void end_run_before_painting(ExecutionOutcome outcome, const CellFault& why);
   bool leave_approach(ExecutionOutcome outcome, const std::string& reason);
   void note_own_time(Job& job, const DurationHistogram& own_time) const;
