@@ -9,6 +9,7 @@
 #include <cstring>
 #include <ctime>
 #include <stdexcept>
+#include <utility>
 
 namespace hilbrush {
 namespace {
@@ -43,6 +44,7 @@ void AuditLog::record(const Peer& peer, const std::string& method, const Json& p
     std::string summary = params.dump(-1, ' ', true, Json::error_handler_t::replace);
     if (summary.size() > kSummaryBytesMax) summary.resize(kSummaryBytesMax);
     Json line{{"time", utc_now_ms()}, {"user", peer.user}, {"uid", peer.uid}, {"pid", peer.pid}};
+    if (peer.user.empty()) line["uid"] = line["pid"] = nullptr;  // it has not said who it is
     if (!peer.address.empty()) line["address"] = peer.address;
     line["method"] = method;
     line["params"] = summary;
@@ -51,6 +53,19 @@ void AuditLog::record(const Peer& peer, const std::string& method, const Json& p
     [[maybe_unused]] const ssize_t written = ::write(fd_, text.data(), text.size());
   } catch (const std::exception&) {
   }
+}
+
+void AuditLog::record_refusal(const Peer& peer, const std::string& method) noexcept {
+  const auto now = std::chrono::steady_clock::now();
+  if (last_refusal_ && now - *last_refusal_ < kRefusalPeriod) {
+    ++refusals_;
+    return;
+  }
+  last_refusal_ = now;
+  const auto unrecorded = std::exchange(refusals_, 0);
+  record(
+      peer, method, Json::object(),
+      unrecorded == 0 ? "refused" : "refused, as " + std::to_string(unrecorded) + " others since the last such line");
 }
 
 }  // namespace hilbrush

@@ -10,6 +10,7 @@
 #include "daemon/server/audit_log.h"
 #include "daemon/server/cell_controller.h"
 #include "daemon/server/cell_thread.h"
+#include "daemon/server/file_thread.h"
 #include "daemon/server/job_painting.h"
 #include "daemon/server/job_planning.h"
 #include "daemon/server/job_queue.h"
@@ -66,6 +67,7 @@ struct Daemon::Implementation {
   PostToSocketThread post{[this](std::function<void()> task) { server.post(std::move(task)); }};
   CellThread thread;
   PipelineChildren children;
+  FileThread checks, copies;
   CellController controller;
   JobQueue queue;
   JobPlanning planning;
@@ -89,7 +91,7 @@ struct Daemon::Implementation {
                  ChildLimits{.silence_s = given.pipeline_silence_s, .resident_bytes = given.pipeline_memory_mb << 20}),
         controller(thread, *devices, description),
         queue(made_folder(state / "jobs"), store),
-        planning(queue, children, description, cell_file, post),
+        planning(queue, {children, checks, copies}, description, cell_file, post),
         painting(queue, controller, thread, children, description, post),
         methods({queue, planning, painting}, controller, audit, [this] { return info(); }) {
     controller.on_own_stop = [this](const std::string& reason) {
@@ -109,6 +111,8 @@ struct Daemon::Implementation {
       tcp_address = tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, queue, access}));
     constexpr double kDevicePollS = .05;
     server.every(kDevicePollS, [this] { controller.check_devices(); });
+    constexpr double kStorePeriodS = 5;
+    server.every(kStorePeriodS, [this] { queue.keep_unkept(); });
   }
 
   Json info() const {

@@ -16,7 +16,8 @@
 ///                            all state of jobs and cell
 ///   executor's thread        CellThread: the only one that commands motion
 ///   stop thread              CellThread: carries out stops, so that no device delays another request
-///   children's thread        PipelineChildren: starts and watches hilbrush-pipeline, copies models
+///   children's thread        PipelineChildren: starts and watches hilbrush-pipeline
+///   check and copy threads   FileThread: open and copy the models of clients, whose file systems may hang
 ///
 /// Threads hand each other closures. Nothing is shared but the executor's stop and pause flags, and the calls of devices
 /// that are thread-safe by themselves.

@@ -43,10 +43,12 @@ bool is_unplanned(const Job& job) {
 
 }  // namespace
 
-JobPlanning::JobPlanning(JobQueue& queue, PipelineChildren& children, const CellDescription& description,
+JobPlanning::JobPlanning(JobQueue& queue, const Threads& threads, const CellDescription& description,
                          fs::path cell_file, PostToSocketThread post)
     : queue_(queue),
-      children_(children),
+      children_(threads.children),
+      checks_(threads.checks),
+      copies_(threads.copies),
       description_(description),
       cell_file_(std::move(cell_file)),
       post_(std::move(post)) {}
@@ -74,10 +76,11 @@ Job JobPlanning::requested_job(const SubmitOrder& order, const Peer& peer) const
   return job;
 }
 
-Job& JobPlanning::submit(const SubmitOrder& order, const Peer& peer) {
-  Job job = requested_job(order, peer);
-  if (Job* earlier = queue_.find_key(order.key)) {
-    if (is_same_order(*earlier, job)) return *earlier;
+/// The job that was submitted with the same key. @throws RpcFault if that was another order, or if no further job may
+/// wait.
+Job* JobPlanning::earlier_job(const Job& job) {
+  if (Job* earlier = queue_.find_key(job.key)) {
+    if (is_same_order(*earlier, job)) return earlier;
     throw RpcFault{kRpcBadParams,
                    "belongs to job " + std::to_string(earlier->id) + ", which was submitted with other parameters",
                    "$.key"};
@@ -86,20 +89,48 @@ Job& JobPlanning::submit(const SubmitOrder& order, const Peer& peer) {
                                        [](const auto& entry) { return is_unplanned(entry.second); });
   if (static_cast<std::size_t>(unplanned) >= kUnplannedMax)
     throw RpcFault{kRpcWrongState, std::to_string(kUnplannedMax) + " jobs wait already: cancel one or wait", ""};
-  try {
-    check_readable(order.model, peer.uid, peer.gid);
-  } catch (const InputError& error) {
-    throw RpcFault{kRpcBadInput, error.sentence(), error.at()};
-  }
-  Job& added = queue_.add(std::move(job));
-  // After the answer, which is to say "queued".
-  post_([this] { plan_next(); });
-  return added;
+  if (queue_.waiting().size() >= JobQueue::kWaitingMax)
+    throw RpcFault{kRpcWrongState,
+                   std::to_string(JobQueue::kWaitingMax) + " jobs wait to be planned or painted: cancel some", ""};
+  return nullptr;
+}
+
+void JobPlanning::submit(const SubmitOrder& order, const Peer& peer, const Reply& reply) {
+  const Job job = requested_job(order, peer);
+  if (const Job* earlier = earlier_job(job)) return reply.result({{"job", job_to_json(*earlier)}});
+  // Its own copy of post_: the thread may still call it when this object is gone.
+  const auto is_taken = checks_.run([this, post = post_, job, reply](const std::stop_token&) {
+    JobError refusal;
+    try {
+      check_readable(job.model, job.uid, job.gid);
+    } catch (const InputError& error) {
+      refusal = {error.at(), error.sentence()};
+    }
+    post([this, job, reply, refusal] {
+      try {
+        reply.result({{"job", job_to_json(add_checked(job, refusal))}});
+      } catch (const RpcFault& fault) {
+        reply.fault(fault);
+      }
+      plan_next();  // after the answer, which is to say "queued"
+    });
+  });
+  if (!is_taken)
+    throw RpcFault{
+        kRpcWrongState,
+        std::to_string(FileThread::kQueueMax) + " models wait to be opened: their file system may not answer", ""};
+}
+
+Job& JobPlanning::add_checked(const Job& job, const JobError& refusal) {
+  if (!refusal.message.empty()) throw RpcFault{kRpcBadInput, refusal.message, refusal.at};
+  // Others may have been submitted while the model was opened.
+  if (Job* earlier = earlier_job(job)) return *earlier;
+  return queue_.add(job);
 }
 
 void JobPlanning::cancel(Job& job) {
   const bool was_planning = current_job(job.id) != nullptr;
-  if (was_planning && current_->child) children_.cancel(*current_->child);
+  if (was_planning) stop_current();
   job.state = JobState::kCancelled;
   job.stage.clear();
   job.eta_s.reset();
@@ -109,7 +140,12 @@ void JobPlanning::cancel(Job& job) {
 
 void JobPlanning::shut_down() {
   is_ending_ = true;
-  if (current_ && current_->child) children_.cancel(*current_->child);
+  if (current_) stop_current();
+}
+
+void JobPlanning::stop_current() {
+  if (current_->child) children_.cancel(*current_->child);
+  if (current_->copy) copies_.cancel(*current_->copy);
 }
 
 void JobPlanning::plan_next() {
@@ -119,7 +155,7 @@ void JobPlanning::plan_next() {
       std::find_if(waiting.begin(), waiting.end(), [](const Job* job) { return job->state == JobState::kQueued; });
   if (found == waiting.end()) return;
   Job& job = *queue_.find((*found)->id);
-  current_ = Current{job.id, std::nullopt};
+  current_ = Current{job.id, std::nullopt, std::nullopt};
   job.state = JobState::kPlanning;
   job.progress = 0;
   job.error.reset();
@@ -190,12 +226,12 @@ void JobPlanning::copy_files(Job& job, const ChildOutcome& outcome) {
   } catch (const Json::exception&) {
     return fail(job, {"", "the pipeline gave no list of the model's files"});
   }
-  children_.run([this, post = post_, id = job.id, model = job.model, folder = job.folder, uid = job.uid, gid = job.gid,
-                 files = std::move(files)] {
+  current_->copy = copies_.run([this, post = post_, id = job.id, model = job.model, folder = job.folder, uid = job.uid,
+                                gid = job.gid, files = std::move(files)](const std::stop_token& stop) {
     std::optional<ModelCopy> copy;
     JobError error;
     try {
-      copy = copy_model(model, files, folder / "model", uid, gid);
+      copy = copy_model(model, files, folder / "model", uid, gid, stop);
     } catch (const InputError& refusal) {
       error = {refusal.at(), refusal.sentence()};
     } catch (const std::exception& failure) {
@@ -210,6 +246,7 @@ void JobPlanning::copy_files(Job& job, const ChildOutcome& outcome) {
       run_pipeline(*planned);
     });
   });
+  if (!current_->copy) fail(job, {"", "the copies of earlier models have not ended"});
 }
 
 void JobPlanning::run_pipeline(Job& job) {

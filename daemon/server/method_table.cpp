@@ -1,6 +1,7 @@
 #include "daemon/server/method_table.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace hilbrush {
 namespace {
 
 constexpr const char* kSessionOpen = "session.open";
+constexpr std::size_t kPageBytes = std::size_t{1} << 18;  // of a list, about: some milliseconds' work
 
 Json object_schema(Json properties, std::vector<std::string> required) {
   return {{"type", "object"},
@@ -114,6 +116,24 @@ std::string id_of(const Json& params) {
   return params.at("id").get<std::string>();
 }
 
+/// Ends with `limit` jobs or when the page gets large, and says where the next one begins.
+Json page_of(const std::vector<const Job*>& jobs, const Job* after, std::size_t limit) {
+  auto next = jobs.begin();
+  if (after != nullptr) {
+    next = std::find(jobs.begin(), jobs.end(), after);
+    if (next == jobs.end()) throw RpcFault{kRpcNoSuchJob, "this job is not in the list any more", "$.after"};
+    ++next;
+  }
+  Json listed = Json::array();
+  for (std::size_t bytes = 0; next != jobs.end() && listed.size() < limit && bytes < kPageBytes; ++next) {
+    bytes += job_json_bytes(**next);
+    listed.push_back(job_to_json(**next));
+  }
+  const bool has_more = next != jobs.end() && !listed.empty();
+  return {{"next", has_more ? Json(std::to_string((*std::prev(next))->id)) : Json(nullptr)},
+          {"jobs", std::move(listed)}};
+}
+
 Json job_result(const Job& job) {
   return {{"job", job_to_json(job)}};
 }
@@ -166,13 +186,13 @@ void MethodTable::add_job_acts(const Jobs& jobs) {
          {"maximum", JobPlanning::kCopiesMax},
          {"description", "parts to paint, one after another; default 1"}}}},
       {"model"});
-  add_act("job.submit", "Takes a model; answers at once, the job is queued.", submit_params,
-          [jobs](const Json& given, const Caller& caller) -> Job& {
-            return jobs.planning.submit(
-                {given.at("model").get<std::string>(), given.value("settings", Json::object()),
-                 given.value("dry_run", false), given.value("key", ""), given.value("copies", 1)},
-                caller.peer);
-          });
+  methods_.push_back({"job.submit", "Takes a model; answered when it was found readable, the job is queued.", true,
+                      submit_params, job, [jobs](const Json& given, const Caller& caller, const Reply& reply) {
+                        jobs.planning.submit(
+                            {given.at("model").get<std::string>(), given.value("settings", Json::object()),
+                             given.value("dry_run", false), given.value("key", ""), given.value("copies", 1)},
+                            caller.peer, reply);
+                      }});
   const Json part = {{"const", true}, {"description", "the operator confirms that the part is in its place"}};
   add_act("job.start", "Paints a ready job; the cell must be armed.",
           object_schema({{"id", id_schema()}, {"part_in_place", part}}, {"id", "part_in_place"}),
@@ -204,24 +224,27 @@ void MethodTable::add_job_views(JobQueue& queue) {
       {"job.get", "One job.", false, job_params(), job, [&queue](const Json& given, const Caller&, const Reply& reply) {
          reply.result(job_result(queue.get(id_of(given))));
        }});
+  Json page = result_with("jobs", {{"type", "array"}, {"items", reference("Job")}});
+  page["properties"]["next"] =
+      nullable("string", "the last job of this page, if more follow: they come with it as \"after\"");
   methods_.push_back(
-      {"job.list", "Jobs, the newest first; or those that wait, in their order.", false,
+      {"job.list",
+       "A page of the jobs, the newest first; or of those that wait, in their order. It ends before it gets large.",
+       false,
        object_schema(
            {{"limit", {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000}, {"description", "default 100"}}},
-            {"order", {{"type", "string"}, {"enum", {"newest", "queue"}}, {"description", "default: newest"}}}},
+            {"order", {{"type", "string"}, {"enum", {"newest", "queue"}}, {"description", "default: newest"}}},
+            {"after", id_schema()}},
            {}),
-       result_with("jobs", {{"type", "array"}, {"items", reference("Job")}}),
-       [&queue](const Json& given, const Caller&, const Reply& reply) {
-         Json jobs = Json::array();
-         const auto limit = given.value("limit", std::size_t{100});
-         if (given.value("order", "newest") == "queue") {
-           for (const Job* waiting : queue.waiting())
-             if (jobs.size() < limit) jobs.push_back(job_to_json(*waiting));
-           return reply.result({{"jobs", std::move(jobs)}});
-         }
-         for (auto entry = queue.jobs().rbegin(); entry != queue.jobs().rend() && jobs.size() < limit; ++entry)
-           jobs.push_back(job_to_json(entry->second));
-         reply.result({{"jobs", std::move(jobs)}});
+       std::move(page), [&queue](const Json& given, const Caller&, const Reply& reply) {
+         std::vector<const Job*> listed;
+         if (given.value("order", "newest") == "queue")
+           listed = queue.waiting();
+         else
+           for (auto entry = queue.jobs().rbegin(); entry != queue.jobs().rend(); ++entry)
+             listed.push_back(&entry->second);
+         const auto after = given.contains("after") ? &queue.get(given.at("after").get<std::string>()) : nullptr;
+         reply.result(page_of(listed, after, given.value("limit", std::size_t{100})));
        }});
   Json watched = result_with("job", reference("Job"));
   watched["properties"]["seq"] =
@@ -286,7 +309,7 @@ void MethodTable::add_session_method() {
                       [this](const Json& given, const Caller& caller, const Reply& reply) {
                         const auto peer = caller.identify(given.at("token").get<std::string>());
                         if (!peer) {
-                          audit_.record(caller.peer, kSessionOpen, Json::object(), "refused");
+                          audit_.record_refusal(caller.peer, kSessionOpen);
                           throw RpcFault{kRpcNotPermitted, "this token belongs to no user", "$.token"};
                         }
                         audit_.record(*peer, kSessionOpen, Json::object(), "ok");
@@ -316,13 +339,29 @@ std::optional<RpcFault> missing_right(const Method& method, const Peer& peer) {
 
 }  // namespace
 
+const Method* MethodTable::find(const std::string& name) const {
+  const auto found =
+      std::find_if(methods_.begin(), methods_.end(), [&](const Method& known) { return known.name == name; });
+  return found == methods_.end() ? nullptr : &*found;
+}
+
+bool MethodTable::is_act(const std::string& name) const {
+  const Method* method = find(name);
+  return method != nullptr && method->is_act;
+}
+
+bool MethodTable::is_open_to_strangers(const std::string& name) const {
+  const Method* method = find(name);
+  return method != nullptr && method->right() == Right::kNone;
+}
+
 void MethodTable::dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const {
-  const auto method =
-      std::find_if(methods_.begin(), methods_.end(), [&](const Method& known) { return known.name == request.method; });
-  if (method == methods_.end())
+  const Method* method = find(request.method);
+  if (method == nullptr)
     return reply.fault({kRpcUnknownMethod,
                         "there is no method \"" + request.method.substr(0, 60) + "\"; rpc.discover lists them", ""});
-  if (method->is_act) {
+  const bool is_stranger = caller.peer.user.empty();  // what they may not do anyway is not worth a line each
+  if (method->is_act && !is_stranger) {
     const auto record = [this, peer = caller.peer, name = method->name, params = request.params](
                             const std::string& result) { audit_.record(peer, name, params, result); };
     reply.result = [record, answer = std::exchange(reply.result, {})](Json result) {

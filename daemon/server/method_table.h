@@ -53,8 +53,13 @@ class MethodTable {
   /// OpenRPC 1.2.6.
   Json discover() const;
   const std::vector<Method>& methods() const { return methods_; }
+  /// False for a method that is not in the table, too.
+  bool is_act(const std::string& name) const;
+  /// May a connection that has not said who it is ask for this?
+  bool is_open_to_strangers(const std::string& name) const;
 
  private:
+  const Method* find(const std::string& name) const;
   void add_job_acts(const Jobs& jobs);
   void add_job_views(JobQueue& queue);
   void add_cell_methods(CellController& controller);

@@ -52,34 +52,36 @@ std::vector<gid_t> groups_of(uid_t uid, gid_t gid) {
   return groups;
 }
 
-/// O_NONBLOCK: opening a pipe must not wait for its writer.
+/// What the path leads to is found out before it is opened: opening a device may already act on it, and opening a
+/// pipe waits for its writer.
 int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
-  int fd = -1;
-  int error = 0;
-  {
-    const AsPeer peer(uid, gid);
-    fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    error = errno;
-  }
-  if (fd < 0) throw InputError(file.string(), std::string("cannot be read: ") + std::strerror(error));
+  const AsPeer peer(uid, gid);
+  const auto refuse = [&] { throw InputError(file.string(), std::string("cannot be read: ") + std::strerror(errno)); };
+  const OpenFile place(::open(file.c_str(), O_PATH | O_CLOEXEC));
+  if (place.get() < 0) refuse();
   struct stat status {};
-  if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
-    ::close(fd);
-    throw InputError(file.string(), "is not a regular file");
-  }
+  if (::fstat(place.get(), &status) != 0) refuse();
+  if (!S_ISREG(status.st_mode)) throw InputError(file.string(), "is not a regular file");
+  const std::string same = "/proc/self/fd/" + std::to_string(place.get());
+  const int fd = ::open(same.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY);
+  if (fd < 0) refuse();
   return fd;
 }
 
-/// Relative to `base`, by name only: links were already followed or not when the list was made.
+/// Relative to `base`. The folder may have been reached by a link; whether the file itself is one was looked at when
+/// the list was made.
 fs::path place_below(const fs::path& file, const fs::path& base) {
-  fs::path relative = fs::absolute(file).lexically_normal().lexically_relative(base);
+  std::error_code error;
+  const fs::path folder = fs::canonical(fs::absolute(file).parent_path(), error);
+  if (error) throw InputError(file.string(), "cannot be read: " + error.message());
+  const fs::path relative = (folder / file.filename()).lexically_relative(base);
   if (relative.empty() || *relative.begin() == "..")
     throw InputError(file.string(), "lies outside the model's folder; a job takes only what is below it");
   return relative;
 }
 
-std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintmax_t bytes_left,
-                         const fs::path& source) {
+std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintmax_t bytes_left, const fs::path& source,
+                         const std::stop_token& stop) {
   fs::create_directories(to.parent_path());
   const OpenFile out(::open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
   if (out.get() < 0)
@@ -87,6 +89,7 @@ std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintma
   std::vector<char> block(std::size_t{1} << 18);
   std::uintmax_t copied = 0;
   for (;;) {
+    if (stop.stop_requested()) throw InputError(source.string(), "is not copied any further: the job was cancelled");
     const ssize_t count = ::read(from, block.data(), block.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throw InputError(source.string(), std::string("cannot be read: ") + std::strerror(errno));
@@ -125,11 +128,13 @@ void check_readable(const fs::path& file, uid_t uid, gid_t gid) {
 }
 
 ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, const fs::path& target, uid_t uid,
-                     gid_t gid) {
+                     gid_t gid, const std::stop_token& stop) {
   if (files.size() > kModelFilesMax)
     throw InputError(model.string(), "refers to more than " + std::to_string(kModelFilesMax) + " files");
-  const fs::path base = fs::absolute(model).lexically_normal().parent_path();
   std::error_code ignored;
+  std::error_code error;
+  const fs::path base = fs::canonical(fs::absolute(model).parent_path(), error);  // as the files' paths are
+  if (error) throw InputError(model.string(), "cannot be read: " + error.message());
   fs::remove_all(target, ignored);
   try {
     Sha256 hash;
@@ -139,7 +144,7 @@ ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, 
       const fs::path relative = place_below(file, base);
       has_model = has_model || relative == model.filename();
       const OpenFile from(open_as_peer(file, uid, gid));
-      bytes += copy_file(from.get(), target / relative, hash, kModelBytesMax - bytes, file);
+      bytes += copy_file(from.get(), target / relative, hash, kModelBytesMax - bytes, file, stop);
     }
     if (!has_model) throw InputError(model.string(), "is not among the files that reading it reads");
     return {target / model.filename(), hash.hex_digest()};

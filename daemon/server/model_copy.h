@@ -1,7 +1,9 @@
 #pragma once
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -34,8 +36,9 @@ class AsPeer {
 void check_readable(const std::filesystem::path& file, uid_t uid, gid_t gid);
 
 /// `files` as `hilbrush-pipeline files` listed them, the model among them. Each keeps its place relative to the model's
-/// folder; one outside that folder is refused. @throws InputError; then `target` holds nothing.
+/// folder; one outside that folder is refused. @throws InputError, also when asked to stop; then `target` holds
+/// nothing.
 ModelCopy copy_model(const std::filesystem::path& model, const std::vector<std::filesystem::path>& files,
-                     const std::filesystem::path& target, uid_t uid, gid_t gid);
+                     const std::filesystem::path& target, uid_t uid, gid_t gid, const std::stop_token& stop = {});
 
 }  // namespace hilbrush

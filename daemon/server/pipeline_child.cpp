@@ -17,9 +17,10 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <system_error>
+#include <utility>
 
-#include "sampling/base/check.h"
 #include "sampling/base/text.h"
 
 namespace hilbrush {
@@ -32,16 +33,35 @@ constexpr std::size_t kStderrBytesMax = 2000;  // of its end, for the message of
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 constexpr int kPollMs = 100;
 
-struct Pipe {
-  int read_end = -1;
-  int write_end = -1;
+/// Closes its descriptor.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(Descriptor&& other) noexcept : fd_(other.release()) {}
+  Descriptor& operator=(Descriptor&&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  int get() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
+
+ private:
+  int fd_ = -1;
 };
+
+struct Pipe {
+  Descriptor read_end, write_end;
+};
+
+[[noreturn]] void throw_system_error(const char* what) {
+  throw std::runtime_error(std::string(what) + ": " + std::strerror(errno));
+}
 
 Pipe make_pipe() {
   int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0)
-    throw std::runtime_error(std::string("no pipe can be made: ") + std::strerror(errno));
-  return {ends[0], ends[1]};
+  if (::pipe2(ends, O_CLOEXEC) != 0) throw_system_error("no pipe can be made");
+  return {Descriptor(ends[0]), Descriptor(ends[1])};
 }
 
 /// The groups of a user, looked up before the fork, where it is still allowed to.
@@ -105,6 +125,24 @@ std::string last_line(const std::string& text) {
                      end - (begin == std::string::npos ? 0 : begin + 1) + 1);
 }
 
+/// Some signals come from the system or from an administrator, and tell nothing about the program.
+std::string signal_sentence(int signal) {
+  const std::string name = ::strsignal(signal);
+  switch (signal) {
+    case SIGXCPU:
+    case SIGXFSZ:
+      return "the pipeline reached a resource limit of the daemon's process: " + name;
+    case SIGKILL:
+      return "the pipeline was killed from outside, as the system does when memory is short: " + name;
+    case SIGTERM:
+    case SIGINT:
+    case SIGHUP:
+      return "the pipeline was ended from outside: " + name;
+    default:
+      return "the pipeline crashed: " + name;
+  }
+}
+
 }  // namespace
 
 struct PipelineChildren::Child {
@@ -131,7 +169,7 @@ struct PipelineChildren::Child {
 
 PipelineChildren::PipelineChildren(std::filesystem::path program, ChildLimits limits)
     : program_(std::move(program)), limits_(limits), wake_fd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-  CHECK(wake_fd_ >= 0);
+  if (wake_fd_ < 0) throw std::runtime_error(std::string("no event can be made: ") + std::strerror(errno));
   thread_ = std::thread([this] { watch(); });
 }
 
@@ -139,40 +177,60 @@ PipelineChildren::~PipelineChildren() {
   {
     const std::lock_guard lock(mutex_);
     is_ending_ = true;
-    tasks_.clear();
+    waiting_.clear();
   }
   ::eventfd_write(wake_fd_, 1);
   thread_.join();
   ::close(wake_fd_);
 }
 
-void PipelineChildren::push(std::function<void()> task) {
+PipelineChildren::ChildId PipelineChildren::start(ChildOrder order) {
+  ChildId id = 0;
+  bool is_full = false;
   {
     const std::lock_guard lock(mutex_);
-    CHECK_LT(tasks_.size(), kQueueMax);  // planning and painting each start one at a time
-    tasks_.push_back(std::move(task));
+    id = ++last_id_;
+    is_full = waiting_.size() >= kQueueMax;
+    if (!is_full) waiting_.push_back({id, std::move(order)});
+  }
+  if (is_full) {
+    ChildOutcome outcome;
+    outcome.error = std::to_string(kQueueMax) + " pipelines wait already";
+    order.on_end(std::move(outcome));
   }
   ::eventfd_write(wake_fd_, 1);
-}
-
-PipelineChildren::ChildId PipelineChildren::start(ChildOrder order) {
-  const ChildId id = ++last_id_;
-  push([this, id, held = std::make_shared<ChildOrder>(std::move(order))] { spawn(id, std::move(*held)); });
   return id;
 }
 
 void PipelineChildren::cancel(ChildId id) {
-  push([this, id] {
-    for (auto& child : children_) {
-      if (child->id != id) continue;
-      child->is_cancelled = true;
-      kill_child(*child, "cancelled");
-    }
-  });
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::erase_if(waiting_, [id](const Waiting& waiting) { return waiting.id == id; }) == 0)
+      cancelled_.push_back(id);
+  }
+  ::eventfd_write(wake_fd_, 1);
 }
 
-void PipelineChildren::run(std::function<void()> task) {
-  push(std::move(task));
+/// @return false when the daemon ends.
+bool PipelineChildren::take_orders() {
+  std::vector<ChildId> cancelled;
+  std::vector<Waiting> orders;
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_ending_) return false;
+    cancelled.swap(cancelled_);
+    while (!waiting_.empty() && children_.size() + orders.size() < kRunningMax) {
+      orders.push_back(std::move(waiting_.front()));
+      waiting_.pop_front();
+    }
+  }
+  for (Waiting& waiting : orders) spawn(waiting.id, std::move(waiting.order));
+  for (auto& child : children_) {
+    if (std::find(cancelled.begin(), cancelled.end(), child->id) == cancelled.end()) continue;
+    child->is_cancelled = true;
+    kill_child(*child, "cancelled");
+  }
+  return true;
 }
 
 void PipelineChildren::watch() {
@@ -184,14 +242,7 @@ void PipelineChildren::watch() {
     ::poll(polled.data(), polled.size(), children_.empty() ? -1 : kPollMs);
     eventfd_t ignored;
     ::eventfd_read(wake_fd_, &ignored);
-
-    std::deque<std::function<void()>> tasks;
-    {
-      const std::lock_guard lock(mutex_);
-      if (is_ending_) break;
-      tasks.swap(tasks_);
-    }
-    for (const auto& task : tasks) task();
+    if (!take_orders()) break;
     for (const auto& child : children_) {
       read_output(*child);
       check_limits(*child);
@@ -211,18 +262,12 @@ void PipelineChildren::spawn(ChildId id, ChildOrder order) {
   child->order = std::move(order);
   child->last_heard = child->last_report = Steady::now();
   try {
-    const Pipe out = make_pipe();
-    child->out_fd = out.read_end;
-    const Pipe err = make_pipe();
-    child->err_fd = err.read_end;
+    Pipe out = make_pipe();
+    Pipe err = make_pipe();
+    const Descriptor null(::open("/dev/null", O_RDWR | O_CLOEXEC));
+    if (null.get() < 0) throw_system_error("/dev/null cannot be opened");
     std::string program = program_.string();
-    Launch launch{{program.data()},
-                  ::open("/dev/null", O_RDWR | O_CLOEXEC),
-                  out.write_end,
-                  err.write_end,
-                  ::getpid(),
-                  std::nullopt,
-                  {}};
+    Launch launch{{program.data()}, null.get(), out.write_end.get(), err.write_end.get(), ::getpid(), std::nullopt, {}};
     for (auto& argument : child->order.arguments) launch.argv.push_back(argument.data());
     launch.argv.push_back(nullptr);
     if (child->order.owner && ::geteuid() == 0 && child->order.owner->uid != 0) {
@@ -231,9 +276,10 @@ void PipelineChildren::spawn(ChildId id, ChildOrder order) {
     }
     child->pid = ::fork();
     if (child->pid == 0) become_pipeline(launch);
-    for (const int fd : {launch.null_fd, launch.out_fd, launch.err_fd}) ::close(fd);
-    if (child->pid < 0) throw std::runtime_error(std::string("no process can be started: ") + std::strerror(errno));
+    if (child->pid < 0) throw_system_error("no process can be started");
     ::setpgid(child->pid, child->pid);  // the child does it too: one of the two is first
+    child->out_fd = out.read_end.release();
+    child->err_fd = err.read_end.release();
     for (const int fd : {child->out_fd, child->err_fd}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
   } catch (const std::exception& error) {
     child->outcome.error = error.what();
@@ -351,7 +397,7 @@ bool PipelineChildren::reap(Child& child) {
     const std::string said = last_line(child.stderr_text);
     const std::string tail = said.empty() ? "" : "; its last message: " + said;
     if (WIFSIGNALED(status))
-      outcome.error = std::string("the pipeline crashed: ") + ::strsignal(WTERMSIG(status)) + tail;
+      outcome.error = signal_sentence(WTERMSIG(status)) + tail;
     else if (WEXITSTATUS(status) == 127 && said.empty() && outcome.error.empty())
       outcome.error = program_.string() + " cannot be started";
     else if (!outcome.is_ok && outcome.error.empty())

@@ -1,7 +1,6 @@
 #pragma once
 #include <sys/types.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -49,13 +48,15 @@ struct ChildOrder {
   std::function<void(ChildOutcome)> on_end;  ///< exactly once, unless cancelled
 };
 
-/// One thread that starts, watches and reaps all children. Its queue holds at most kQueueMax orders and tasks.
-/// Methods: any thread.
+/// One thread that starts, watches and reaps all children, and does nothing else: what it would wait for, a painting
+/// job would wait for, too. Methods: any thread.
 class PipelineChildren {
  public:
   using ChildId = std::uint64_t;
-  static constexpr std::size_t kQueueMax = 64;
+  static constexpr std::size_t kRunningMax = 8;  ///< children; cancelled ones that are still ending count
+  static constexpr std::size_t kQueueMax = 64;   ///< orders that wait; further ones end at once, with an error
 
+  /// @throws std::runtime_error if the system has no descriptor left.
   PipelineChildren(std::filesystem::path program, ChildLimits limits);
   /// Kills the children that still run; no callback is called any more.
   ~PipelineChildren();
@@ -63,15 +64,17 @@ class PipelineChildren {
   PipelineChildren& operator=(const PipelineChildren&) = delete;
 
   ChildId start(ChildOrder order);
-  /// Kills the child if it still runs; its on_end may still have been called before.
+  /// Kills the child if it runs, drops its order if it waits; its on_end may still have been called before.
   void cancel(ChildId id);
-  /// Short work (copying a model) that must not be done on the socket thread.
-  void run(std::function<void()> task);
 
  private:
   struct Child;
-  void push(std::function<void()> task);
+  struct Waiting {
+    ChildId id = 0;
+    ChildOrder order;
+  };
   void watch();
+  bool take_orders();
   void spawn(ChildId id, ChildOrder order);
   void read_output(Child& child);
   void take_line(Child& child, const std::string& line);
@@ -84,9 +87,10 @@ class PipelineChildren {
   const ChildLimits limits_;
   int wake_fd_ = -1;
   std::mutex mutex_;
-  std::deque<std::function<void()>> tasks_;  ///< guarded by mutex_
-  bool is_ending_ = false;                   ///< guarded by mutex_
-  std::atomic<ChildId> last_id_{0};
+  std::deque<Waiting> waiting_;                   ///< guarded by mutex_
+  std::vector<ChildId> cancelled_;                ///< guarded by mutex_; of children that run: each at most once
+  bool is_ending_ = false;                        ///< guarded by mutex_
+  ChildId last_id_ = 0;                           ///< guarded by mutex_
   std::vector<std::unique_ptr<Child>> children_;  ///< the watching thread's
   std::thread thread_;
 };

@@ -250,6 +250,45 @@ TEST(ServerJobsTest, PipelinesInTroubleFailTheirJobsWithASentenceAndDisturbNoPai
   EXPECT_EQ(emission_counts(world.job_folder(painting)), std::vector<std::size_t>(3000, 1));
 }
 
+TEST(ServerJobsTest, AModelBelowALinkedFolderIsTaken) {
+  DaemonWorld world;
+  world.begin();
+  LineClient client = world.client();
+  const auto model = world.model("linked.wrl");
+  const fs::path real = world.folder() / "real";
+  fs::create_directories(real);
+  fs::copy_file(model, real / "linked.wrl");
+  fs::create_directory_symlink(real, world.folder() / "link");
+  const auto id = client.result(
+      "job.submit", {{"model", (world.folder() / "link" / "linked.wrl").string()}, {"settings", {{"size_mm", 80}}}});
+  EXPECT_EQ(world.wait_for(client, id.at("job").at("id").get<std::string>(), "ready").at("model_copy"),
+            (world.job_folder(id.at("job").at("id").get<std::string>()) / "model" / "linked.wrl").string());
+}
+
+/// More than the queue of orders ever held, while a gigabyte is copied.
+TEST(ServerJobsTest, QuickCancelsWhileAModelIsCopiedEndNothingButTheirJobs) {
+  DaemonWorld world;
+  world.begin();
+  LineClient client = world.client();
+  const auto submit = [&](const fs::path& model) {
+    const Json answer = client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}});
+    return answer.at("job").at("id").get<std::string>();
+  };
+  const auto large = world.model("large.wrl");
+  fs::resize_file(large, std::uintmax_t{1} << 30);
+  const auto copied = submit(large);
+  const auto copy = world.job_folder(copied) / "model" / "large.wrl";
+  const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
+  while (!fs::exists(copy) && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+  std::vector<std::string> others;
+  const auto hang = world.model("hang.wrl");
+  for (int i = 0; i < 60; ++i) others.push_back(submit(hang));
+  client.result("job.cancel", named(copied));
+  for (const auto& id : others) EXPECT_EQ(client.result("job.cancel", named(id)).at("job").at("state"), "cancelled");
+  world.submit(client, world.model("cup.wrl"), "ready");
+  EXPECT_FALSE(fs::exists(copy)) << "nothing of it is left";
+}
+
 TEST(ServerJobsTest, APipelineThatIsNotThereFailsTheJob) {
   DaemonWorld world;
   world.options.pipeline = "/nowhere/hilbrush-pipeline";
@@ -385,6 +424,9 @@ TEST(ServerJobsTest, BadOrdersAreRefusedWithTheirPlace) {
   EXPECT_EQ(refusal({{"model", "cup.wrl"}}).at("code"), kRpcBadParams) << "a relative path";
   EXPECT_EQ(refusal({{"model", "/nowhere/cup.wrl"}}).at("code"), kRpcBadInput);
   EXPECT_EQ(refusal({{"model", "/tmp"}}).at("code"), kRpcBadInput) << "a folder";
+  EXPECT_EQ(refusal({{"model", "/dev/null"}}).at("code"), kRpcBadInput) << "a device";
+  ASSERT_EQ(::mkfifo((world.folder() / "fifo").c_str(), 0600), 0);
+  EXPECT_EQ(refusal({{"model", (world.folder() / "fifo").string()}}).at("code"), kRpcBadInput) << "a pipe";
   const auto model = world.model("cup.wrl").string();
   EXPECT_EQ(refusal({{"model", model}, {"settings", {{"size_mm", -3}}}}).at("code"), kRpcBadInput);
   EXPECT_NE(refusal({{"model", model}, {"settings", {{"color", "red"}}}}).dump().find("color"), std::string::npos);
