@@ -44,6 +44,10 @@ bool is_same_digest(const std::string& a, const std::string& b) {
   return difference == 0;
 }
 
+std::string host_of(const std::string& address) {
+  return address.substr(0, address.rfind(':'));
+}
+
 }  // namespace
 
 Access::Access(const DaemonSettings& settings) : has_rules_(settings.access.has_value()) {
@@ -94,6 +98,19 @@ std::optional<Peer> Access::token_peer(const std::string& token, const std::stri
     if (is_same_digest(known.sha256, digest)) found = known.peer;
   if (found) found->address = address;
   return found;
+}
+
+bool TokenFailures::may_try(const std::string& address) {
+  std::erase_if(failures_,
+                [now = Clock::now()](const auto& entry) { return now - entry.second.first > std::chrono::minutes(1); });
+  const auto found = failures_.find(host_of(address));
+  return found == failures_.end() || found->second.count < kFailuresMax;
+}
+
+void TokenFailures::note(const std::string& address) {
+  if (failures_.size() >= kAddressesMax) failures_.clear();
+  Failures& failures = failures_[host_of(address)];
+  if (failures.count++ == 0) failures.first = Clock::now();
 }
 
 }  // namespace hilbrush

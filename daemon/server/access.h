@@ -1,6 +1,9 @@
 #pragma once
 #include <sys/types.h>
 
+#include <chrono>
+#include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,6 +37,26 @@ class Access {
   bool has_rules_ = false;
   std::vector<Rule> rules_;
   std::vector<Token> tokens_;
+};
+
+/// Wrong tokens by the address they came from: after too many within a minute, no token from there is tried. Socket
+/// thread only.
+class TokenFailures {
+ public:
+  static constexpr int kFailuresMax = 20;             ///< of an address within a minute
+  static constexpr std::size_t kAddressesMax = 1000;  ///< that are remembered
+
+  /// `address`: host:port, of which the host counts.
+  bool may_try(const std::string& address);
+  void note(const std::string& address);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Failures {
+    int count = 0;
+    Clock::time_point first;
+  };
+  std::map<std::string, Failures> failures_;
 };
 
 }  // namespace hilbrush

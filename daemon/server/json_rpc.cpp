@@ -1,6 +1,7 @@
 #include "daemon/server/json_rpc.h"
 
 #include <algorithm>
+#include <array>
 
 namespace hilbrush {
 namespace {
@@ -9,10 +10,11 @@ std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// Brackets outside strings: a cheap look before parsing, because values deeper than any of ours only serve to exhaust
-/// a stack.
-bool is_too_deep(std::string_view text) {
-  int depth = 0;
+/// A cheap look at what stands outside strings, before parsing: values deeper than any of ours only serve to exhaust a
+/// stack, objects with more members only to take time. @return a sentence, or nothing.
+std::string excess(std::string_view text) {
+  std::array<int, kRpcDepthMax + 1> members{};
+  std::size_t depth = 0;
   bool is_in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -24,12 +26,15 @@ bool is_too_deep(std::string_view text) {
     } else if (c == '"') {
       is_in_string = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > kRpcDepthMax) return true;
+      if (++depth > kRpcDepthMax) return "the message is nested more than " + std::to_string(kRpcDepthMax) + " deep";
+      members[depth] = 0;
     } else if (c == ']' || c == '}') {
-      --depth;
+      if (depth > 0) --depth;
+    } else if (c == ':' && ++members[depth] > kRpcMembersMax) {
+      return "an object has at most " + std::to_string(kRpcMembersMax) + " members";
     }
   }
-  return false;
+  return {};
 }
 
 RpcElement element_of(const Json& json) {
@@ -100,8 +105,7 @@ RpcMessage parse_rpc(std::string_view line) {
     message.elements.push_back({RpcFault{code, std::move(sentence), ""}, nullptr});
     return message;
   };
-  if (is_too_deep(line))
-    return refuse(kRpcParse, "the message is nested more than " + std::to_string(kRpcDepthMax) + " deep");
+  if (std::string sentence = excess(line); !sentence.empty()) return refuse(kRpcParse, std::move(sentence));
   Json json;
   try {
     json = Json::parse(line);

@@ -43,6 +43,7 @@ struct RpcMessage {
 
 inline constexpr std::size_t kRpcBatchMax = 64;
 inline constexpr int kRpcDepthMax = 32;
+inline constexpr int kRpcMembersMax = 500;  ///< of an object: parsing takes time by the square of it
 
 /// Never throws: everything that is wrong becomes a fault among the elements.
 RpcMessage parse_rpc(std::string_view line);

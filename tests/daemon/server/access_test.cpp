@@ -89,10 +89,12 @@ TEST(ServerTcpTest, AConnectionSaysWhoItIsFirst) {
   DaemonWorld world;
   world.options.settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{my_name(), sha256_hex("secret")}}};
   world.begin();
+  for (const char* method : {"cell.stop", "job.list", "rpc.discover", "no.such.method"}) {
+    const auto stranger = LineClient::over_tcp(world.daemon().tcp_address());
+    EXPECT_NE(stranger->error_code(method), 0) << method;
+    EXPECT_FALSE(stranger->read_line()) << "closed after its first message";
+  }
   const auto client = LineClient::over_tcp(world.daemon().tcp_address());
-  EXPECT_EQ(client->error_code("cell.stop"), kRpcNotPermitted) << "not even that: it could be anybody";
-  EXPECT_EQ(client->error_code("job.list"), kRpcNotPermitted);
-  EXPECT_EQ(client->error_code("rpc.discover"), kRpcNotPermitted);
   EXPECT_EQ(client->result("session.open", {{"token", "secret"}}).at("user"), my_name());
   EXPECT_TRUE(client->result("job.list").at("jobs").empty());
   EXPECT_EQ(client->result("cell.stop").at("cell").at("state"), "stopped");
@@ -110,6 +112,49 @@ TEST(ServerTcpTest, AConnectionSaysWhoItIsFirst) {
   EXPECT_EQ(log.find("sesame"), std::string::npos);
   EXPECT_NE(log.find("\"address\":\"127.0.0.1:"), std::string::npos);
   EXPECT_NE(log.find("refused"), std::string::npos);
+}
+
+std::string audit_log(const DaemonWorld& world) {
+  std::ifstream in(world.options.state / "audit.log");
+  return std::string((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+}
+
+TEST(ServerTcpTest, StrangersFillNeitherTheLogNorTheRoomOfOthers) {
+  DaemonWorld world;
+  world.options.settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{my_name(), sha256_hex("secret")}}};
+  world.begin();
+  const std::string address = world.daemon().tcp_address();
+  std::vector<std::unique_ptr<LineClient>> idle;
+  for (int i = 0; i < 100; ++i) idle.push_back(LineClient::over_tcp(address));
+  std::string flood;
+  for (int i = 0; i < 2000; ++i)
+    flood += R"({"jsonrpc":"2.0","id":1,"method":"cell.stop"})"
+             "\n";
+  for (int i = 0; i < 20; ++i) {
+    const auto stranger = LineClient::over_tcp(address);
+    stranger->send_bytes(flood);
+    const auto liar = LineClient::over_tcp(address);
+    EXPECT_EQ(liar->error_code("session.open", {{"token", "sesame"}}), kRpcNotPermitted);
+  }
+  LineClient local = world.client();
+  EXPECT_LT(local.result("system.info").at("system").at("clients"), 40) << "the oldest strangers were closed";
+  const std::string log = audit_log(world);
+  EXPECT_LT(log.size(), 1000u) << "refusals are counted";
+  EXPECT_NE(log.find("\"uid\":null"), std::string::npos) << "a stranger is not root: " << log;
+  const auto late = LineClient::over_tcp(address);
+  EXPECT_EQ(late->error_code("session.open", {{"token", "secret"}}), kRpcNotPermitted)
+      << "after twenty wrong tokens no further one from this address is tried";
+  EXPECT_EQ(local.result("cell.stop").at("cell").at("state"), "stopped");
+}
+
+TEST(ServerTcpTest, AStrangersMessageIsShort) {
+  DaemonWorld world;
+  world.options.settings.tcp = DaemonSettings::Tcp{"127.0.0.1", 0, {{my_name(), sha256_hex("secret")}}};
+  world.begin();
+  const auto stranger = LineClient::over_tcp(world.daemon().tcp_address());
+  stranger->send_bytes(std::string(10000, ' '));
+  EXPECT_EQ(stranger->read_message().at("error").at("code"), kRpcParse);
+  EXPECT_FALSE(stranger->read_line());
 }
 
 TEST(ServerTcpTest, ATakenPortIsASentence) {

@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <tuple>
 
 #include "config/rpc_errors.h"
 #include "daemon/server/job_queue.h"
@@ -81,6 +83,51 @@ TEST(ServerQueueTest, TheOrderCanBeChangedAndSurvivesARestart) {
     EXPECT_TRUE(state.empty() || job_of(client, a).at("state") == "queued" || job_of(client, c).at("state") == "ready");
   for (const auto& id : {b, a}) world.wait_for(client, id, "ready");
   EXPECT_EQ(queue_of(client), (std::vector{c, b, a}));
+}
+
+TEST(ServerQueueTest, AThousandJobsAreListedInBatchesAndMovedWhileAStopIsAnsweredAtOnce) {
+  DaemonWorld world;
+  {
+    fs::create_directories(world.options.state);
+    JobStore store(world.options.state / "jobs.sqlite");
+    for (int i = 0; i < 1000; ++i) {
+      Job job;
+      job.state = JobState::kReady;
+      job.rank = i + 1;
+      job.warnings.assign(20, std::string(500, 'w'));
+      store.insert(job);
+    }
+  }
+  world.begin();
+  LineClient client = world.client();
+  LineClient greedy = world.client();
+  std::string batch;
+  for (int i = 0; i < 64; ++i)
+    batch +=
+        (i > 0 ? "," : "[") + std::string(R"({"jsonrpc":"2.0","id":1,"method":"job.list","params":{"limit":1000}})");
+  greedy.send_bytes(batch + "]\n");
+  std::chrono::steady_clock::duration worst{};
+  for (int i = 0; i < 20; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    client.result("cell.stop");
+    worst = std::max(worst, std::chrono::steady_clock::now() - begin);
+  }
+  EXPECT_LT(worst, std::chrono::seconds(1));
+  const auto answers = greedy.read_line();
+  ASSERT_TRUE(answers);
+  EXPECT_LT(answers->size(), 2000000u) << "the answer to a batch is bounded";
+  EXPECT_EQ(Json::parse(*answers).size(), 64u) << "every request is answered";
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(client.result("job.move", {{"id", "1000"}, {"position", 1}}).at("job").at("position"), 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+  EXPECT_EQ(job_of(client, "1").at("position"), 2);
+  EXPECT_EQ(
+      client.error_code("job.submit", {{"model", world.model("a.wrl").string()}, {"settings", {{"size_mm", 80}}}}),
+      kRpcWrongState)
+      << "the queue is bounded";
+  world.end();
+  JobStore store(world.options.state / "jobs.sqlite");
+  EXPECT_LT(store.find(1000)->rank, store.find(1)->rank) << "the new order is kept";
 }
 
 TEST(ServerQueueTest, CopiesArePaintedOneAfterAnotherEachOnItsOwnPart) {
@@ -282,12 +329,94 @@ TEST(JobStoreTest, AnOldSchemaIsMigratedAndNothingIsLost) {
   EXPECT_EQ(again.notice(), "");
 }
 
-TEST(JobStoreTest, AStoreOfANewerDaemonIsSetAsideWithASentence) {
+TEST(JobStoreTest, AStoreOfANewerDaemonIsRefusedAndLeftAsItIs) {
   const test::TemporaryFolder folder;
   execute_sql(folder / "jobs.sqlite", "CREATE TABLE job (id INTEGER); PRAGMA user_version = 99;");
+  try {
+    const JobStore store(folder / "jobs.sqlite");
+    ADD_FAILURE() << "taken";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("newer"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1) << "not set aside";
+}
+
+/// A change that could not be written is written later, although others could be written meanwhile.
+TEST(JobStoreTest, WhatCouldNotBeStoredIsStoredLater) {
+  const test::TemporaryFolder folder;
   JobStore store(folder / "jobs.sqlite");
-  EXPECT_NE(store.notice().find("newer"), std::string::npos);
-  EXPECT_TRUE(store.is_new());
+  JobQueue queue(folder / "jobs", store);
+  const auto a = queue.add(Job{}).id;
+  const auto b = queue.add(Job{}).id;
+  const fs::path record = folder / "jobs" / std::to_string(a);
+  fs::remove_all(record);
+  std::ofstream(record) << "no folder";
+  execute_sql(folder / "jobs.sqlite", "CREATE TRIGGER full BEFORE UPDATE ON job WHEN NEW.id = " + std::to_string(a) +
+                                          " BEGIN SELECT RAISE(ABORT, 'full'); END;");
+  queue.find(a)->state = JobState::kCancelled;
+  queue.changed(*queue.find(a));
+  queue.changed(*queue.find(b));
+  EXPECT_FALSE(queue.store_fault().empty()) << "another job that could be stored mends nothing";
+  EXPECT_EQ(store.find(a)->state, JobState::kQueued);
+  execute_sql(folder / "jobs.sqlite", "DROP TRIGGER full");
+  fs::remove(record);
+  queue.keep_unkept();
+  EXPECT_EQ(store.find(a)->state, JobState::kCancelled);
+  EXPECT_EQ(queue.store_fault(), "");
+}
+
+TEST(ServerQueueTest, APipeInPlaceOfARecordHangsNothing) {
+  DaemonWorld world;
+  fs::create_directories(world.job_folder("3"));
+  ASSERT_EQ(::mkfifo((world.job_folder("3") / "job.json").c_str(), 0600), 0);
+  world.begin();
+  LineClient client = world.client();
+  EXPECT_EQ(job_of(client, "3").at("state"), "failed") << "its files keep its number";
+}
+
+/// A daemon with another cell keeps the job for one with the job's cell.
+TEST(ServerQueueTest, AJobOfAnotherCellIsRefusedAndKept) {
+  DaemonWorld world;
+  world.options.time_scale = .02;
+  const std::string cell = world.options.cell;
+  std::string ready, paused;
+  world.begin();
+  {
+    LineClient client = world.client();
+    paused = world.submit(client, world.model("cup.wrl", 400), "ready");
+    ready = world.submit(client, world.model("other.wrl", 20), "ready");
+    world.clear_and_arm(client);
+    client.result("job.start", placed(paused));
+    while (job_of(client, paused).at("dots").at("exposed").get<int>() < 20) std::this_thread::yield();
+  }
+  world.end();
+  std::ifstream in(cell);
+  Json changed = Json::parse(in);
+  changed["limit_margin"] = changed.at("limit_margin").get<double>() + .001;
+  world.options.cell = world.folder() / "changed.json";
+  std::ofstream(world.options.cell) << changed;
+  world.begin();
+  {
+    LineClient client = world.client();
+    world.clear_and_arm(client);
+    for (const auto& [id, act, kept] : {std::tuple(paused, "job.resume", "paused"), {ready, "job.start", "ready"}}) {
+      client.result(act, placed(id));
+      const Json job = world.wait_for(client, id, kept);
+      EXPECT_NE(job.at("error").at("message").get<std::string>().find("another cell"), std::string::npos) << job;
+    }
+    EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "idle") << "not stopped: the cell is sound";
+  }
+  world.end();
+  world.options.cell = cell;
+  world.begin();
+  LineClient client = world.client();
+  world.clear_and_arm(client);
+  client.result("job.resume", placed(paused));
+  const Json end = world.wait_for(client, paused, "done");
+  EXPECT_EQ(end.at("dots").at("exposed").get<int>() + end.at("dots").at("in_doubt").get<int>(), 400);
+  client.result("cell.arm");
+  client.result("job.start", placed(ready));
+  EXPECT_EQ(world.wait_for(client, ready, "done").at("dots").at("exposed"), 20);
 }
 
 TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
@@ -333,7 +462,15 @@ TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobo
     const std::string id = world.submit(client, world.model("cup.wrl", 5), "done", true);
     EXPECT_EQ(client.result("job.get", {{"id", id}}).at("job").at("state"), "done");
   }
-  EXPECT_EQ(client.result("job.list", {{"limit", 1000}}).at("jobs").size(), 1000u);
+  std::size_t count = 0;
+  Json params{{"limit", 1000}};
+  for (Json next = ""; !next.is_null(); params["after"] = next) {
+    const Json page = client.result("job.list", params);
+    EXPECT_LT(page.dump().size(), 400000u) << "a page is bounded";
+    count += page.at("jobs").size();
+    next = page.at("next");
+  }
+  EXPECT_EQ(count, 1000u) << "the pages are the whole list";
   EXPECT_EQ(client.result("job.get", {{"id", "1"}}).at("job").at("state"), "done") << "older ones are looked up";
 }
 

@@ -91,6 +91,44 @@ TEST(ServerSocketTest, ServesBatchesAndNotifications) {
   EXPECT_EQ(client.read_message().at("error").at("code"), kRpcInvalidRequest);
 }
 
+TEST(ServerSocketTest, AStopOvertakesWhatWaitsAndTheActsOfItsConnectionThatItOvertakesAreRefused) {
+  DaemonWorld world;
+  world.begin();
+  LineClient client = world.client();
+  client.result("cell.clear");
+  std::string pipelined;
+  for (int i = 0; i < 40; ++i)
+    pipelined += R"({"jsonrpc":"2.0","id":"list","method":"rpc.discover"})"
+                 "\n";
+  pipelined += R"({"jsonrpc":"2.0","id":"arm","method":"cell.arm"})"
+               "\n";
+  pipelined += R"({"jsonrpc":"2.0","id":"stop","method":"cell.stop"})"
+               "\n";
+  client.send_bytes(pipelined);
+  std::size_t lists_before_stop = 0;
+  for (bool is_stopped = false, is_refused = false; !is_stopped || !is_refused;) {
+    const Json answer = client.read_message();
+    ASSERT_FALSE(answer.is_null());
+    if (answer.at("id") == "list" && !is_stopped) ++lists_before_stop;
+    if (answer.at("id") == "stop") is_stopped = answer.at("result").at("cell").at("state") == "stopped";
+    if (answer.at("id") == "arm") is_refused = answer.at("error").at("code") == kRpcWrongState;
+  }
+  EXPECT_LT(lists_before_stop, 40u);
+  EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "stopped");
+}
+
+TEST(ServerSocketTest, AnObjectOfTooManyMembersIsRefusedBeforeItIsParsed) {
+  DaemonWorld world;
+  world.begin();
+  LineClient client = world.client();
+  std::string members;
+  for (int i = 0; i < 80000; ++i) members += (i > 0 ? ",\"" : "\"") + std::to_string(i) + "\":1";
+  const auto begin = std::chrono::steady_clock::now();
+  client.send_bytes(R"({"jsonrpc":"2.0","id":1,"method":"job.submit","params":{)" + members + "}}\n");
+  EXPECT_EQ(client.read_message().at("error").at("code"), kRpcParse);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+}
+
 TEST(ServerSocketTest, AHugeMessageIsRefusedAndItsConnectionClosed) {
   DaemonWorld world;
   world.begin();
