@@ -1,5 +1,6 @@
 #include "sampling/laminar/laminar.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -69,21 +70,38 @@ double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
   return mass;
 }
 
+bool is_blank(const TexturedMesh& mesh, const ToneField& tone) {
+  for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
+    if (!tone.is_blank(t)) return false;
+  return true;
+}
+
+/// Slices that give no dot, because there is nothing to paint or because they do not meet it.
+[[noreturn]] void throw_unmet(const TexturedMesh& mesh, const ToneField& tone) {
+  if (is_blank(mesh, tone))
+    throw InputError("", "the surface asks for no dots at all: it is blank, white or transparent everywhere");
+  const auto [low, high] = bounds(mesh);
+  throw InputError("", fmt::format("horizontal slices (curve laminar) give no dot: the surface to be painted is level, "
+                                   "or too small for them (the object is {:.3g} mm high); choose the curve hilbert, or "
+                                   "set the object upright with --up",
+                                   1e3 * (high.z() - low.z())));
+}
+
 double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, std::uint64_t count) {
   const double wanted = static_cast<double>(count);
   double pitch = std::sqrt(mass / wanted);
-  double best = pitch;
+  double best = 0;
   double best_error = 1e300;
   for (int round = 0; round < kMaxTrials && pitch > 0 && best_error > kCountTolerance; ++round) {
     const double found = toned_length(Slices(mesh, pitch), tone, pitch) / pitch;
     const double error = std::abs(found / wanted - 1);
-    if (error < best_error) {
+    if (found > 0 && error < best_error) {
       best_error = error;
       best = pitch;
     }
     pitch = found > 0 ? pitch * std::sqrt(found / wanted) : pitch / 2;
   }
-  if (!(best > 0)) throw InputError("", "no horizontal slice meets a surface that is to be painted");
+  if (!(best > 0)) throw_unmet(mesh, tone);
   return best;
 }
 
@@ -195,7 +213,10 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   const Slices slices(mesh, pitch);
   const double length = toned_length(slices, tone, pitch);
   const std::uint64_t count = options.dot_count.value_or(static_cast<std::uint64_t>(std::llround(length / pitch)));
-  if (count == 0) return sequence;
+  if (count == 0) {
+    if (!is_blank(mesh, tone)) throw_unmet(mesh, tone);
+    return sequence;
+  }
 
   const Surface surface(mesh);
   const std::vector<std::uint32_t> component_of = components_of(mesh, surface.neighbors);

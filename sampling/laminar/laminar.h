@@ -17,7 +17,8 @@ namespace hilbrush {
 /// the pitch is searched so that slices and dots along them are equally far apart (within a percent), and the count is
 /// exact. omega, sampler and seed have no effect. Deterministic. `report`, if given, holds the path and, as
 /// patch_count, the number of pieces of all contours.
-/// @throws InputError as place_dots(), and for a count if no slice meets a surface that asks for dots.
+/// @throws InputError as place_dots(), and if the surface asks for dots but its slices give none: level sheets,
+/// needles.
 DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const SampleOptions& options,
                           SampleReport* report = nullptr, const Progress& progress = {});
 

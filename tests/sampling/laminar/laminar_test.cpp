@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string>
 
 #include "sampling/base/input_error.h"
 #include "sampling/laminar/contours.h"
@@ -129,11 +131,46 @@ TEST(Laminar, ToneIsDitheredAlongTheContours) {
   EXPECT_NEAR(left / static_cast<double>(dots.dots.size()), .75, .01);
 }
 
+std::string message_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A tetrahedron of 60 mm with a base of .06 nanometers, upright or lying.
+TexturedMesh needle(bool is_upright) {
+  TexturedMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {6e-11, 0, 0}, {0, 6e-11, 0}, {0, 0, .06}};
+  mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+  if (!is_upright)
+    for (auto& p : mesh.vertices) p = {p.z(), p.x(), p.y()};
+  return test::finish(std::move(mesh));
+}
+
+TEST(Laminar, SlenderObjectsGetTheirCountOrAMessage) {
+  for (const bool is_upright : {true, false}) {
+    const TexturedMesh mesh = needle(is_upright);
+    const ToneField tone(mesh, {});
+    for (const SampleOptions& options : {with_count(500), with_pitch(.000254)}) {
+      std::size_t count = 0;
+      const std::string message = message_of([&] { count = place_laminar(mesh, tone, options).dots.size(); });
+      EXPECT_TRUE(message.empty() ? count == options.dot_count : message.find("too small") != std::string::npos)
+          << count << " dots, " << message;
+    }
+  }
+}
+
 TEST(Laminar, HorizontalFacesGetNothing) {
   const TexturedMesh plate = test::rectangle(.02, .02, 3, 3);
   const ToneField tone(plate, {});
-  EXPECT_TRUE(place_laminar(plate, tone, with_pitch(.001)).dots.empty());
-  EXPECT_THROW(place_laminar(plate, tone, with_count(10)), InputError);
+  for (const SampleOptions& options : {with_pitch(.001), with_count(10)}) {
+    const std::string message = message_of([&] { place_laminar(plate, tone, options); });
+    EXPECT_NE(message.find("level"), std::string::npos) << message;
+    EXPECT_EQ(message.find("blank"), std::string::npos) << "the plate is black: " << message;
+  }
   const TexturedMesh cube = test::cube();
   const ToneField cube_tone(cube, {});
   for (const Dot& dot : place_laminar(cube, cube_tone, with_count(999)).dots) EXPECT_NEAR(dot.normal_O.z(), 0, 1e-6);
