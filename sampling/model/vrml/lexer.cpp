@@ -74,7 +74,8 @@ void Lexer::read_token() {
     token_.kind = TokenKind::kPunctuation;
     token_.text = text_.substr(next_, 1);
     ++next_;
-  } else if (is_digit(c) || ((c == '+' || c == '-' || c == '.') && (is_digit(second) || second == '.'))) {
+  } else if (is_digit(c) || ((c == '+' || c == '-') && (is_digit(second) || second == '.')) ||
+             (c == '.' && is_digit(second))) {
     read_number();
   } else {
     const std::size_t start = next_;
@@ -94,7 +95,8 @@ void Lexer::read_string() {
     count_line_end();
     ++next_;
   }
-  if (next_ >= text_.size()) throw InputError(at(token_.line), "the string that starts here has no closing quote");
+  if (next_ >= text_.size())
+    throw InputError(at(token_.line), "the string that starts here has no closing quote");
   token_.kind = TokenKind::kString;
   token_.text = text_.substr(start, next_ - start);
   ++next_;
@@ -123,10 +125,11 @@ void Lexer::read_number() {
       result.ec = {};
     }
   }
-  if (result.ec == std::errc::result_out_of_range || !std::isfinite(token_.number))
+  const bool is_number = result.ptr == end;
+  if (is_number && (result.ec == std::errc::result_out_of_range || !std::isfinite(token_.number)))
     throw InputError(at(token_.line), "the number " + quoted(text) + " is out of range");
-  if (result.ec != std::errc() || result.ptr != end)
-    throw InputError(at(token_.line), "expected a number, found " + quoted(text));
+  // File names without quotes (VRML 1.0) and DEF names may begin like numbers.
+  if (result.ec != std::errc() || result.ptr != end) token_.kind = TokenKind::kWord;
 }
 
 std::string describe(const Token& token) {

@@ -15,6 +15,16 @@ constexpr std::size_t kFieldCost = 24;
 constexpr std::size_t kStringCost = 8;
 constexpr std::size_t kParserWarningLimit = 100;
 
+bool begins_like_number(std::string_view word) {
+  return !word.empty() &&
+         (word.front() == '+' || word.front() == '-' || (word.front() >= '0' && word.front() <= '9'));
+}
+
+/// VRML 1.0: an SFString without a blank in it needs no quotes, and many exporters write file names so.
+bool is_unquoted_string(std::string_view field, int version) {
+  return version == 1 && (field == "filename" || field == "name");
+}
+
 bool is_interface_word(std::string_view word) {
   return word == "field" || word == "exposedField" || word == "eventIn" || word == "eventOut";
 }
@@ -43,7 +53,8 @@ class Parser {
   Scene parse_file() {
     scopes_.emplace_back();
     while (lexer_.peek().kind != TokenKind::kEnd)
-      if (NodePointer node = parse_statement("a node at the top of the file")) scene_.roots.push_back(std::move(node));
+      if (NodePointer node = parse_statement("a node at the top of the file"))
+        scene_.roots.push_back(std::move(node));
     return std::move(scene_);
   }
 
@@ -145,14 +156,18 @@ class Parser {
       warn(line, "USE of a name that was never defined: " + name.substr(0, 80));
       return nullptr;
     }
+    // A Script may name itself or what it stands in: it controls them, and is not a surface.
+    if (found->second->is_open && script_depth_ > 0) return nullptr;
     if (found->second->is_open)
-      throw InputError(lexer_.at(line), "USE " + name.substr(0, 80) + " inside its own DEF: the model contains itself");
+      throw InputError(lexer_.at(line),
+                       "USE " + name.substr(0, 80) + " inside its own DEF: the model contains itself");
     return found->second;
   }
 
   std::shared_ptr<const Prototype> find_prototype(const std::string& type) const {
     for (auto scope = scopes_.rbegin(); scope != scopes_.rend(); ++scope)
-      if (const auto found = scope->prototypes.find(type); found != scope->prototypes.end()) return found->second;
+      if (const auto found = scope->prototypes.find(type); found != scope->prototypes.end())
+        return found->second;
     return nullptr;
   }
 
@@ -182,7 +197,9 @@ class Parser {
     if (token.text == "PROTO" || token.text == "EXTERNPROTO" || token.text == "ROUTE") {
       parse_statement(expected);
     } else if (is_interface_word(token.text)) {
+      ++script_depth_;
       parse_interface_member(node.fields, true);
+      --script_depth_;
     } else if (token.text == "DEF" || token.text == "USE") {
       add_child(node, parse_node(expected), token.line);
     } else {
@@ -195,7 +212,8 @@ class Parser {
   }
 
   void add_child(Node& node, NodePointer child, int line) {
-    if (scene_.version == 2) warn(line, "a node stands in " + node.type.substr(0, 80) + " without a field name");
+    if (scene_.version == 2)
+      warn(line, "a node stands in " + node.type.substr(0, 80) + " without a field name");
     if (child) node.children.push_back(std::move(child));
   }
 
@@ -204,10 +222,19 @@ class Parser {
     Field field;
     field.name = std::string(name.text);
     field.line = name.line;
-    parse_value(field);
-    // Normals are not used: faces have their own.
+    // Normals are not used: faces have their own. So whatever stands in their brackets is no fault ("nan").
     const bool is_unused = field.name == "normalIndex" || (node.type == "Normal" && field.name == "vector");
+    if (is_unused && lexer_.peek().is('[')) return skip_list();
+    parse_value(field);
     if (!is_unused) node.fields.push_back(std::move(field));
+  }
+
+  void skip_list() {
+    while (!lexer_.peek().is(']')) {
+      if (lexer_.peek().kind == TokenKind::kEnd) fail(lexer_.peek(), "']'");
+      lexer_.take();
+    }
+    lexer_.take();
   }
 
   void parse_value(Field& field) {
@@ -222,6 +249,9 @@ class Parser {
       lexer_.take();
     } else if (token.is('(')) {
       parse_flags(field.value);
+    } else if (is_unquoted_string(field.name, scene_.version) && token.kind == TokenKind::kWord) {
+      spend_values(kStringCost, token.line);
+      field.value.strings.emplace_back(lexer_.take().text);
     } else if (token.kind == TokenKind::kNumber) {
       while (lexer_.peek().kind == TokenKind::kNumber) parse_item(field, expected);
     } else {
@@ -275,7 +305,7 @@ class Parser {
       lexer_.take();
       if (lexer_.peek().is('{')) {
         value.nodes.push_back(parse_body(std::string(token.text), "", token.line));
-      } else if (scene_.version == 1) {
+      } else if (scene_.version == 1 && !begins_like_number(token.text)) {
         spend_values(kStringCost, token.line);
         value.strings.emplace_back(token.text);
       } else {
@@ -352,6 +382,7 @@ class Parser {
   std::vector<Scope> scopes_;
   Scene scene_;
   int depth_ = 0;
+  int script_depth_ = 0;  ///< Scripts whose fields are being read
 };
 
 }  // namespace

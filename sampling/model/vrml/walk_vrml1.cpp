@@ -6,8 +6,8 @@
 #include "sampling/model/vrml/reading.h"
 #include "sampling/model/vrml/surfaces.h"
 
-/// The walk over a VRML 1.0 tree. Properties are nodes here, not fields of shapes: they change a state that later
-/// shapes use, until the enclosing Separator ends.
+/// The walk over a VRML 1.0 tree. Properties are nodes here, not fields of shapes: they change a state that
+/// later shapes use, until the enclosing Separator ends.
 namespace hilbrush::vrml {
 namespace {
 
@@ -90,7 +90,8 @@ class Vrml1Walker {
       const double which = type == "LOD" ? 0 : number_of(node, "whichChild", -1);
       constexpr double kAll = -3;
       for (std::size_t i = 0; i < children.size(); ++i)
-        if (which == kAll || which == static_cast<double>(i)) walk_node({children[i].get(), node.frame}, inner);
+        if (which == kAll || which == static_cast<double>(i))
+          walk_node({children[i].get(), node.frame}, inner);
     } else {
       for (const NodePointer& child : children) walk_node({child.get(), node.frame}, inner);
     }
@@ -154,12 +155,14 @@ class Vrml1Walker {
   }
 
   Look look_of(const State& state) {
+    // Without a Material its defaults hold.
     Look look;
+    look.source = ColorSource::kMaterial;
+    look.luminance = luminance_of_srgb(.8, .8, .8);
     if (state.material) {
-      look.source = ColorSource::kMaterial;
       const std::vector<double>& diffuse = numbers_of(state.material, "diffuseColor");
-      look.luminance =
-          diffuse.size() < 3 ? luminance_of_srgb(.8, .8, .8) : luminance_of_srgb(diffuse[0], diffuse[1], diffuse[2]);
+      look.luminance = diffuse.size() < 3 ? luminance_of_srgb(.8, .8, .8)
+                                          : luminance_of_srgb(diffuse[0], diffuse[1], diffuse[2]);
       const std::vector<double>& transparency = numbers_of(state.material, "transparency");
       if (!transparency.empty()) look.opacity = 1 - std::clamp(transparency[0], 0., 1.);
     }
@@ -197,8 +200,8 @@ class Vrml1Walker {
     node.fields.push_back(std::move(field));
   }
 
-  /// Adds the fields that bind the material's colors to `surface`, and the colors to `colors`; without a binding
-  /// neither.
+  /// Adds the fields that bind the material's colors to `surface`, and the colors to `colors`; without a
+  /// binding neither.
   static void bind_colors(const Reference& node, const State& state, Node& surface, Node& colors) {
     const std::string& binding = state.material_binding;
     const bool is_per_vertex = binding.starts_with("PER_VERTEX");
@@ -215,8 +218,12 @@ class Vrml1Walker {
 
   /// As a VRML 2.0 face set of the same numbers: only their fields and the binding of colors differ.
   FaceList face_set(const Reference& node, const State& state) {
-    reading_.spend(numbers_of(node, "coordIndex").size(), *node.node);
-    if (state.coordinates) reading_.spend(numbers_of(state.coordinates, "point").size(), *node.node);
+    for (const char* field : {"coordIndex", "textureCoordIndex", "materialIndex"})
+      reading_.spend(numbers_of(node, field).size(), *node.node);
+    for (const auto& [property, field] : {std::pair{state.coordinates, "point"},
+                                          {state.texture_coordinates, "point"},
+                                          {state.material, "diffuseColor"}})
+      if (property) reading_.spend(numbers_of(property, field).size(), *node.node);
     Node surface;
     surface.type = node.node->type;
     surface.file = node.node->file;
@@ -227,10 +234,12 @@ class Vrml1Walker {
     Node colors;
     bind_colors(node, state, surface, colors);
     SurfaceParts parts{state.coordinates, {}, state.texture_coordinates};
-    if (!colors.fields.empty() && colors.fields[0].value.numbers.size() > 3) parts.colors = {&colors, nullptr};
+    if (!colors.fields.empty() && colors.fields[0].value.numbers.size() > 3)
+      parts.colors = {&colors, nullptr};
     std::vector<std::string> warnings;
     FaceList faces = indexed_face_set({&surface, nullptr}, parts, look_of(state).luminance, warnings);
     reading_.warn(warnings);
+    reading_.spend(faces.corners.size(), *node.node);
     return faces;
   }
 
