@@ -13,6 +13,7 @@ namespace hilbrush::vrml {
 struct Frame {
   const Node* instance = nullptr;
   const Frame* outer = nullptr;
+  std::size_t search_items = 0;  ///< fields of this instance and the outer ones: what a search may visit
 };
 
 /// A node, seen from inside of `frame`.
@@ -39,10 +40,13 @@ BoundValue find(const Reference& reference, std::string_view field);
 /// Fields by type. What is absent gives `otherwise`; too few numbers are an InputError that names the field.
 double number_of(const Reference& reference, std::string_view field, double otherwise);
 bool flag_of(const Reference& reference, std::string_view field, bool otherwise);
-Eigen::Vector2d vector2_of(const Reference& reference, std::string_view field, const Eigen::Vector2d& otherwise);
-Eigen::Vector3d vector3_of(const Reference& reference, std::string_view field, const Eigen::Vector3d& otherwise);
+Eigen::Vector2d vector2_of(const Reference& reference, std::string_view field,
+                           const Eigen::Vector2d& otherwise);
+Eigen::Vector3d vector3_of(const Reference& reference, std::string_view field,
+                           const Eigen::Vector3d& otherwise);
 /// x y z angle
-Eigen::Vector4d rotation_of(const Reference& reference, std::string_view field, const Eigen::Vector4d& otherwise);
+Eigen::Vector4d rotation_of(const Reference& reference, std::string_view field,
+                            const Eigen::Vector4d& otherwise);
 std::string word_of(const Reference& reference, std::string_view field, const std::string& otherwise);
 
 /// The field's numbers, or an empty list.

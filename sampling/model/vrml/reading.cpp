@@ -13,8 +13,9 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kWarningLimit = 200;
 constexpr std::size_t kUrlLimit = 16;         ///< tried of one list
-constexpr std::size_t kLookupLimit = 20'000;  ///< searches for files of one model
-constexpr std::size_t kWorkPerTriangle = 16;  ///< numbers that geometry may be made from, for each triangle allowed
+constexpr std::size_t kWorkPerTriangle = 16;  ///< items that work may be spent on, for each triangle allowed
+constexpr std::size_t kBaseWork = 100'000;    ///< items that any model may spend work on
+constexpr std::size_t kTextItem = 16;         ///< bytes of a name that are compared in the time of a number
 
 /// Geometry where a Shape must stand around it.
 bool is_bare_geometry(const std::string& type) {
@@ -26,10 +27,11 @@ bool is_bare_geometry(const std::string& type) {
 /// Nodes that belong to a scene but never to a surface: not worth a warning.
 bool is_scenery(const std::string& type) {
   static const std::set<std::string> types{
-      "Viewpoint", "NavigationInfo", "Background", "Fog", "Sound", "AudioClip", "MovieTexture", "WorldInfo", "Script",
-      "DirectionalLight", "PointLight", "SpotLight", "TimeSensor", "TouchSensor", "PlaneSensor", "SphereSensor",
-      "CylinderSensor", "ProximitySensor", "VisibilitySensor", "ColorInterpolator", "CoordinateInterpolator",
-      "NormalInterpolator", "OrientationInterpolator", "PositionInterpolator", "ScalarInterpolator",
+      "Viewpoint", "NavigationInfo", "Background", "Fog", "Sound", "AudioClip", "MovieTexture", "WorldInfo",
+      "Script", "DirectionalLight", "PointLight", "SpotLight", "TimeSensor", "TouchSensor", "PlaneSensor",
+      "SphereSensor", "CylinderSensor", "ProximitySensor", "VisibilitySensor", "ColorInterpolator",
+      "CoordinateInterpolator", "NormalInterpolator", "OrientationInterpolator", "PositionInterpolator",
+      "ScalarInterpolator",
       // VRML 1.0
       "Info", "FontStyle", "Normal", "NormalBinding", "OrthographicCamera", "PerspectiveCamera"};
   return types.count(type) > 0;
@@ -57,8 +59,7 @@ void Reading::warn(const Node& node, const std::string& sentence) {
 
 void Reading::warn(const std::vector<std::string>& sentences) {
   for (const std::string& sentence : sentences)
-    if (warnings.size() < kWarningLimit && std::find(warnings.begin(), warnings.end(), sentence) == warnings.end())
-      warnings.push_back(sentence);
+    if (warnings.size() < kWarningLimit && said_.insert(sentence).second) warnings.push_back(sentence);
 }
 
 const Scene& Reading::parse_text(const std::string& text, const std::string& name) {
@@ -67,14 +68,21 @@ const Scene& Reading::parse_text(const std::string& text, const std::string& nam
   return *scene;
 }
 
-const Scene* Reading::open_inline(const Node& node, const std::vector<std::string>& urls) {
+std::vector<std::string> Reading::tried_urls(const Node& node, const std::vector<std::string>& all) {
+  const std::size_t count = std::min(all.size(), kUrlLimit);
+  const std::vector<std::string> urls(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
+  for (const std::string& url : urls) spend(1 + url.size() / kTextItem, node);
+  return urls;
+}
+
+const Scene* Reading::open_inline(const Node& node, const std::vector<std::string>& all_urls) {
+  const std::vector<std::string> urls = tried_urls(node, all_urls);
   const auto [known, is_new] = inline_lists_.try_emplace({folder_of(node).string(), urls}, nullptr);
   if (!is_new) return known->second;
   std::string reason = "it names no file";
-  for (std::size_t i = 0; i < std::min(urls.size(), kUrlLimit) && lookup_count_ < kLookupLimit; ++i) {
-    ++lookup_count_;
+  for (std::size_t i = 0; i < urls.size(); ++i) {
     // Links into a file are not followed: "arm.wrl#Viewpoint" is arm.wrl.
-    const auto file = folder_.find(folder_of(node), urls[i].substr(0, urls[i].find('#')));
+    const auto file = images_.find(folder_of(node), urls[i].substr(0, urls[i].find('#')));
     if (!file) {
       reason = file.reason();
       continue;
@@ -82,42 +90,28 @@ const Scene* Reading::open_inline(const Node& node, const std::vector<std::strin
     const auto [found, is_first] = scenes_.try_emplace(file->string());
     if (is_first) {
       const std::string text = folder_.read(*file);
-      found->second = std::make_unique<Scene>(parse(text, folder_.name(*file), limits_, parse_budget_, warnings));
+      found->second =
+          std::make_unique<Scene>(parse(text, folder_.name(*file), limits_, parse_budget_, warnings));
     }
     return known->second = found->second.get();
   }
-  ++missing_inline_count_;
+  if (missing_inline_count_++ == 0) first_missing_inline_ = quoted_list(urls) + ": " + reason;
   warn(node, "the inlined file cannot be read (" + reason + "); tried " + quoted_list(urls));
   return nullptr;
 }
 
-int Reading::open_image(const Node& node, const std::vector<std::string>& urls) {
+int Reading::open_image(const Node& node, const std::vector<std::string>& all_urls) {
+  const std::vector<std::string> urls = tried_urls(node, all_urls);
   const auto [known, is_new] = image_lists_.try_emplace({folder_of(node).string(), urls}, -1);
   if (!is_new) return known->second;
   std::string reason = "it names no file";
-  for (std::size_t i = 0; i < std::min(urls.size(), kUrlLimit) && lookup_count_ < kLookupLimit; ++i) {
-    ++lookup_count_;
-    const auto file = folder_.find(folder_of(node), urls[i]);
-    if (!file) {
-      reason = file.reason();
-      continue;
-    }
-    const auto [found, is_first] = images_.try_emplace(file->string(), Failure{});
-    if (is_first) found->second = add_image(*file);
-    if (found->second) return known->second = *found->second;
-    reason = found->second.reason();
+  for (const std::string& url : urls) {
+    const auto image = images_.open(folder_of(node), url);
+    if (image) return known->second = *image;
+    reason = image.reason();
   }
   warn(node, "the texture cannot be read (" + reason + "); tried " + quoted_list(urls));
   return -1;
-}
-
-Result<int> Reading::add_image(const fs::path& file) {
-  auto texture = read_image_(file, limits_.image_pixels - pixel_count_);
-  if (!texture) return Failure{texture.reason()};
-  pixel_count_ += texture->luminance.size();
-  texture->name = folder_.name(file);
-  folder_.note(file);
-  return builder.add_texture(std::move(*texture));
 }
 
 int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
@@ -126,8 +120,10 @@ int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
   if (image.size() < 3 || image[0] < 1 || image[1] < 1) return -1;  // 0 0 0 means: no texture
   const double count = std::floor(image[0]) * std::floor(image[1]);
   if (image[2] < 1 || image[2] > 4 || count > static_cast<double>(image.size() - 3) ||
-      count > static_cast<double>(limits_.image_pixels - pixel_count_)) {
-    warn(node, "the texture of pixels cannot be read: it must have width, height, 1 to 4 channels, and as many pixels");
+      count > static_cast<double>(images_.pixels_left())) {
+    warn(node,
+         "the texture of pixels cannot be read: it must have width, height, 1 to 4 channels, and as many "
+         "pixels");
     return -1;
   }
   Texture texture;
@@ -140,34 +136,56 @@ int Reading::pixel_texture(const Node& node, const std::vector<double>& image) {
     const auto pixel = static_cast<std::uint32_t>(value);
     const auto channel = [&](int c) { return ((pixel >> (8 * (texture.channels - 1 - c))) & 255u) / 255.; };
     const bool is_gray = texture.channels < 3;
-    texture.luminance.push_back(luminance_of_srgb(channel(0), channel(is_gray ? 0 : 1), channel(is_gray ? 0 : 2)));
-    if (texture.channels % 2 == 0) texture.opacity.push_back(static_cast<float>(channel(texture.channels - 1)));
+    texture.luminance.push_back(
+        luminance_of_srgb(channel(0), channel(is_gray ? 0 : 1), channel(is_gray ? 0 : 2)));
+    if (texture.channels % 2 == 0)
+      texture.opacity.push_back(static_cast<float>(channel(texture.channels - 1)));
   }
-  pixel_count_ += texture.luminance.size();
-  return known->second = builder.add_texture(std::move(texture));
+  return known->second = images_.add(std::move(texture));
 }
 
+namespace {
+
+/// What a search through the node's fields may visit.
+std::size_t search_items(const Node& node) {
+  std::size_t items = 1 + node.fields.size() + node.children.size();
+  for (const Field& field : node.fields)
+    for (const std::string& text : field.value.strings) items += 1 + text.size() / kTextItem;
+  return items;
+}
+
+}  // namespace
+
 Reference Reading::resolve(Reference reference) {
-  while (reference) {
+  for (int links = 0; reference; ++links) {
     const Node& node = *reference.node;
     if (++node_count_ > limits_.nodes)
-      throw InputError(at(node), "with USE, PROTO and Inline expanded the model has more nodes than the limit of " +
-                                     std::to_string(limits_.nodes));
+      throw InputError(at(node),
+                       "with USE, PROTO and Inline expanded the model has more nodes than the limit of " +
+                           std::to_string(limits_.nodes));
+    if (links > limits_.depth)
+      throw InputError(at(node), "PROTOs that stand for each other are nested more than " +
+                                     std::to_string(limits_.depth) + " deep");
+    // A field of a PROTO's body may be one of the instance, and so on outwards.
+    spend(search_items(node) + (reference.frame ? reference.frame->search_items : 0), node);
     if (!node.prototype) return reference;
     if (!node.prototype->body) {
       ignore(node);
       return {};
     }
-    frames_.push_back({&node, reference.frame});
+    const std::size_t outer_items = reference.frame ? reference.frame->search_items : 0;
+    const std::size_t items = search_items(node) + node.prototype->defaults.size();
+    frames_.push_back({&node, reference.frame, outer_items + items});
     reference = {node.prototype->body.get(), &frames_.back()};
   }
   return reference;
 }
 
-void Reading::spend(std::size_t numbers, const Node& node) {
-  work_ += numbers;
-  if (work_ > kWorkPerTriangle * limits_.triangles)
-    throw InputError(at(node), "with USE, PROTO and Inline expanded the model has more geometry than the limit allows");
+void Reading::spend(std::size_t items, const Node& node) {
+  work_ += items;
+  if (work_ > kBaseWork + kWorkPerTriangle * limits_.triangles)
+    throw InputError(at(node),
+                     "with USE, PROTO and Inline expanded the model has more geometry than the limit allows");
 }
 
 void Reading::ignore(const Node& node) {
@@ -185,7 +203,8 @@ std::string Reading::no_surface_sentence() const {
     types += (types.empty() ? "" : ", ") + std::to_string(entry.count) + " " + type.substr(0, 60) +
              (is_bare_geometry(type) ? " (without a Shape around it)" : "");
   if (missing_inline_count_ > 0)
-    sentence += "; " + std::to_string(missing_inline_count_) + " inlined files are missing";
+    sentence += "; " + std::to_string(missing_inline_count_) +
+                " inlined files cannot be read (the first: " + first_missing_inline_ + ")";
   if (!types.empty()) sentence += "; nodes that make no surface or are not known: " + types;
   return sentence;
 }
@@ -194,8 +213,8 @@ TexturedMesh Reading::finish(const std::string& name) {
   if (builder.mesh().triangles.empty()) throw InputError(name, no_surface_sentence());
   for (const auto& [type, entry] : ignored_)
     if (warnings.size() < kWarningLimit)
-      warnings.push_back(entry.first_at + ": " + type.substr(0, 80) + " is left out (" + std::to_string(entry.count) +
-                         (entry.count == 1 ? " node)" : " nodes)"));
+      warnings.push_back(entry.first_at + ": " + type.substr(0, 80) + " is left out (" +
+                         std::to_string(entry.count) + (entry.count == 1 ? " node)" : " nodes)"));
   return builder.finish(warnings);
 }
 
@@ -215,7 +234,8 @@ Context deeper(const Reading& reading, const Context& context, const Node& node)
   return inner;
 }
 
-void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls, const Context& context) {
+void walk_inline(Reading& reading, const Node& node, const std::vector<std::string>& urls,
+                 const Context& context) {
   const Scene* scene = reading.open_inline(node, urls);
   if (!scene) return;
   if (std::find(context.files.begin(), context.files.end(), scene) != context.files.end()) {

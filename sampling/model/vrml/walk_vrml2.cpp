@@ -18,8 +18,8 @@ Eigen::Affine2d vrml2_texture_transform(const Reference& node) {
   const Vector2d center = vector2_of(node, "center", Vector2d::Zero());
   const Vector2d scale = vector2_of(node, "scale", Vector2d::Ones());
   const Vector2d translation = vector2_of(node, "translation", Vector2d::Zero());
-  return Eigen::Translation2d(-center) * Eigen::Scaling(scale) * Eigen::Rotation2Dd(number_of(node, "rotation", 0)) *
-         Eigen::Translation2d(center + translation);
+  return Eigen::Translation2d(-center) * Eigen::Scaling(scale) *
+         Eigen::Rotation2Dd(number_of(node, "rotation", 0)) * Eigen::Translation2d(center + translation);
 }
 
 class Vrml2Walker {
@@ -53,7 +53,8 @@ class Vrml2Walker {
  private:
   void walk_children(const Reference& node, const char* field, const Context& context) {
     if (const BoundValue children = find(node, field))
-      for (const NodePointer& child : children.value->nodes) walk_node({child.get(), children.frame}, context);
+      for (const NodePointer& child : children.value->nodes)
+        walk_node({child.get(), children.frame}, context);
     for (const NodePointer& child : node.node->children) walk_node({child.get(), node.frame}, context);
   }
 
@@ -63,7 +64,9 @@ class Vrml2Walker {
     walk_node({choices.value->nodes[static_cast<std::size_t>(choice)].get(), choices.frame}, context);
   }
 
-  Reference resolved_field(const Reference& node, const char* field) { return reading_.resolve(node_of(node, field)); }
+  Reference resolved_field(const Reference& node, const char* field) {
+    return reading_.resolve(node_of(node, field));
+  }
 
   Look look_of(const Reference& shape) {
     Look look;
@@ -85,7 +88,8 @@ class Vrml2Walker {
   void add_texture(const Reference& node, Look& look) {
     if (node.node->type == "ImageTexture") {
       const BoundValue url = find(node, "url");
-      if (url && !url.value->strings.empty()) look.texture = reading_.open_image(*node.node, url.value->strings);
+      if (url && !url.value->strings.empty())
+        look.texture = reading_.open_image(*node.node, url.value->strings);
     } else if (node.node->type == "PixelTexture") {
       if (const BoundValue image = find(node, "image"))
         look.texture = reading_.pixel_texture(*node.node, image.value->numbers);
@@ -95,7 +99,8 @@ class Vrml2Walker {
     look.repeat_u = flag_of(node, "repeatS", true);
     look.repeat_v = flag_of(node, "repeatT", true);
     // An image with an alpha channel brings its own transparency (VRML97, table 4.6).
-    if (look.texture >= 0 && reading_.builder.mesh().textures[static_cast<std::size_t>(look.texture)].channels % 2 == 0)
+    if (look.texture >= 0 &&
+        reading_.builder.mesh().textures[static_cast<std::size_t>(look.texture)].channels % 2 == 0)
       look.opacity = 1;
   }
 
@@ -110,11 +115,13 @@ class Vrml2Walker {
 
   FaceList faces_of(const Reference& node, float luminance) {
     const std::string& type = node.node->type;
-    if (type == "IndexedFaceSet" || type == "ElevationGrid" || type == "Extrusion") return surface_of(node, luminance);
+    if (type == "IndexedFaceSet" || type == "ElevationGrid" || type == "Extrusion")
+      return surface_of(node, luminance);
     if (type == "Box") return box(vector3_of(node, "size", Vector3d::Constant(2)));
     if (type == "Sphere") return sphere(number_of(node, "radius", 1));
     const Parts parts{flag_of(node, "side", true), flag_of(node, "top", true), flag_of(node, "bottom", true)};
-    if (type == "Cylinder") return cylinder(number_of(node, "radius", 1), number_of(node, "height", 2), parts);
+    if (type == "Cylinder")
+      return cylinder(number_of(node, "radius", 1), number_of(node, "height", 2), parts);
     if (type == "Cone") return cone(number_of(node, "bottomRadius", 1), number_of(node, "height", 2), parts);
     reading_.ignore(*node.node);
     return {};
@@ -123,9 +130,13 @@ class Vrml2Walker {
   FaceList surface_of(const Reference& node, float luminance) {
     const SurfaceParts parts{resolved_field(node, "coord"), resolved_field(node, "color"),
                              resolved_field(node, "texCoord")};
-    for (const char* field : {"coordIndex", "height", "spine", "crossSection"})
+    for (const char* field : {"coordIndex", "texCoordIndex", "colorIndex", "height", "spine", "crossSection",
+                              "scale", "orientation"})
       reading_.spend(numbers_of(node, field).size(), *node.node);
-    if (parts.coordinates) reading_.spend(numbers_of(parts.coordinates, "point").size(), *node.node);
+    for (const auto& [part, field] : {std::pair{parts.coordinates, "point"},
+                                      {parts.colors, "color"},
+                                      {parts.texture_coordinates, "point"}})
+      if (part) reading_.spend(numbers_of(part, field).size(), *node.node);
     std::vector<std::string> warnings;
     FaceList faces = node.node->type == "IndexedFaceSet"  ? indexed_face_set(node, parts, luminance, warnings)
                      : node.node->type == "ElevationGrid" ? elevation_grid(node, parts, luminance, warnings)
