@@ -19,11 +19,12 @@ namespace {
 using std::filesystem::path;
 
 constexpr std::size_t kStripRows = 64;  ///< read at once: bounds the memory beside the texture's own
-/// A picture as its file has it, unpacked: interlaced and progressive ones are unpacked whole. 64 Mpixels of 4 channels
-/// of 16 bits, or of 2 in floating point.
+/// A picture as its file has it, unpacked: interlaced and progressive ones are unpacked whole. 64 Mpixels of
+/// 4 channels of 16 bits, or of 2 in floating point.
 constexpr std::size_t kMaxImageBytes = std::size_t{512} << 20;
 constexpr std::size_t kMaxTileBytes = std::size_t{64} << 20;  ///< 4096 x 4096 pixels of 4 bytes
-/// None, CCITT (2 to 4), LZW, JPEG, deflate (its two numbers), packed bits. The others (LERC, JBIG, WebP, Zstandard,
+/// None, CCITT (2 to 4), LZW, JPEG, deflate (its two numbers), packed bits. The others (LERC, JBIG, WebP,
+/// Zstandard,
 /// ...) unpack to a size that stands in their own stream, and no exporter of textures uses them.
 constexpr std::array kTiffCompressions{1, 2, 3, 4, 5, 7, 8, 32773, 32946};
 
@@ -61,8 +62,9 @@ std::string tiff_fault(const OIIO::ImageSpec& spec) {
   const std::size_t tile_bytes = spec.tile_width > 0 ? spec.tile_bytes(true) : 0;
   if (tile_bytes > kMaxTileBytes)
     return "its tiles of " + std::to_string(spec.tile_width) + " x " + std::to_string(spec.tile_height) +
-           " pixels take " + number(static_cast<double>(tile_bytes) / (1 << 20)) + " MB each, more than the " +
-           std::to_string(kMaxTileBytes >> 20) + " MB allowed; save it in strips or smaller tiles";
+           " pixels take " + number(static_cast<double>(tile_bytes) / (1 << 20)) +
+           " MB each, more than the " + std::to_string(kMaxTileBytes >> 20) +
+           " MB allowed; save it in strips or smaller tiles";
   const int compression = spec.get_int_attribute("tiff:Compression", 1);
   if (std::ranges::find(kTiffCompressions, compression) == kTiffCompressions.end())
     return "its compression (TIFF's number " + std::to_string(compression) +
@@ -93,7 +95,8 @@ std::string header_fault(const OIIO::ImageSpec& spec, std::size_t pixel_limit) {
 class TextureFiller {
  public:
   TextureFiller(Texture& texture, bool is_linear) : texture_(texture), is_linear_(is_linear) {
-    const std::size_t count = static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height);
+    const std::size_t count =
+        static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height);
     texture_.luminance.resize(count);
     if (texture.channels % 2 == 0) texture_.opacity.resize(count);
   }
@@ -104,8 +107,12 @@ class TextureFiller {
     store(x, row_from_top, linear, codes[texture_.channels - 1] / 65535.f);
   }
   void set(int x, int row_from_top, const float* values) {
-    const auto clamped = [&](int c) { return std::isfinite(values[c]) ? std::clamp(values[c], 0.f, 1.f) : 0.f; };
-    const auto linear = [&](int c) { return is_linear_ ? clamped(c) : static_cast<float>(srgb_to_linear(clamped(c))); };
+    const auto clamped = [&](int c) {
+      return std::isfinite(values[c]) ? std::clamp(values[c], 0.f, 1.f) : 0.f;
+    };
+    const auto linear = [&](int c) {
+      return is_linear_ ? clamped(c) : static_cast<float>(srgb_to_linear(clamped(c)));
+    };
     store(x, row_from_top, linear, clamped(texture_.channels - 1));
   }
   /// An image without a transparent pixel is opaque.
@@ -117,9 +124,9 @@ class TextureFiller {
  private:
   template <class Linear>
   void store(int x, int row_from_top, const Linear& linear, float alpha) {
-    const std::size_t at =
-        static_cast<std::size_t>(texture_.height - 1 - row_from_top) * static_cast<std::size_t>(texture_.width) +
-        static_cast<std::size_t>(x);
+    const std::size_t at = static_cast<std::size_t>(texture_.height - 1 - row_from_top) *
+                               static_cast<std::size_t>(texture_.width) +
+                           static_cast<std::size_t>(x);
     texture_.luminance[at] =
         texture_.channels < 3 ? linear(0) : .2126f * linear(0) + .7152f * linear(1) + .0722f * linear(2);
     if (!texture_.opacity.empty()) texture_.opacity[at] = alpha;
@@ -130,7 +137,8 @@ class TextureFiller {
 };
 
 template <class Value>
-bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, TextureFiller& filler) {
+bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+               TextureFiller& filler) {
   // A tiled file is read by whole rows of tiles.
   const int step = spec.tile_height > 0 ? spec.tile_height : static_cast<int>(kStripRows);
   const auto channels = static_cast<std::size_t>(spec.nchannels);
@@ -138,10 +146,11 @@ bool read_rows(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeD
                            static_cast<std::size_t>(spec.width) * channels);
   for (int y = 0; y < spec.height; y += step) {
     const int end = std::min(y + step, spec.height);
-    const bool ok = spec.tile_width > 0 ? input.read_tiles(0, 0, spec.x, spec.x + spec.width, spec.y + y, spec.y + end,
-                                                           0, 1, 0, spec.nchannels, type, strip.data())
-                                        : input.read_scanlines(0, 0, spec.y + y, spec.y + end, 0, 0, spec.nchannels,
-                                                               type, strip.data());
+    const bool ok =
+        spec.tile_width > 0
+            ? input.read_tiles(0, 0, spec.x, spec.x + spec.width, spec.y + y, spec.y + end, 0, 1, 0,
+                               spec.nchannels, type, strip.data())
+            : input.read_scanlines(0, 0, spec.y + y, spec.y + end, 0, 0, spec.nchannels, type, strip.data());
     if (!ok || input.has_error()) return false;
     for (int row = y; row < end; ++row)
       for (int x = 0; x < spec.width; ++x)
@@ -181,7 +190,8 @@ Result<Texture> decode(const path& file, const std::string& format, std::size_t 
                            : read_rows<std::uint16_t>(*input, spec, OIIO::TypeDesc::UINT16, filler);
   const std::string fault = input->geterror();
   input->close();
-  if (!ok || !fault.empty()) return Failure{"the " + format + " picture is truncated or corrupt: " + one_line(fault)};
+  if (!ok || !fault.empty())
+    return Failure{"the " + format + " picture is truncated or corrupt: " + one_line(fault)};
   filler.finish();
   return texture;
 }
@@ -193,7 +203,8 @@ Result<Texture> load_image_file(const path& file, std::size_t pixel_limit) {
   std::call_once(limits_set, [] { OIIO::attribute("limits:imagesize_MB", 512); });
 
   // No useful picture has more than 16 bytes a pixel in its file, but small ones may carry metadata.
-  const auto bytes = read_bytes(file, (std::size_t{16} << 20) + 16 * std::min<std::size_t>(pixel_limit, 16u << 20));
+  const auto bytes =
+      read_bytes(file, (std::size_t{16} << 20) + 16 * std::min<std::size_t>(pixel_limit, 16u << 20));
   if (!bytes) return Failure{bytes.reason()};
   const std::string format = image_format(file, *bytes);
   if (std::string fault = fault_before_decoding(format, *bytes, pixel_limit); !fault.empty())
@@ -211,8 +222,9 @@ void save_png(const Picture& picture, const path& file) {
                              static_cast<std::size_t>(std::max(picture.channels, 0));
   if (wanted == 0 || (picture.channels != 1 && picture.channels != 3) || picture.pixels.size() != wanted)
     throw InputError(file.string(), "a picture of " + std::to_string(picture.width) + " x " +
-                                        std::to_string(picture.height) + " x " + std::to_string(picture.channels) +
-                                        " with " + std::to_string(picture.pixels.size()) + " bytes cannot be written");
+                                        std::to_string(picture.height) + " x " +
+                                        std::to_string(picture.channels) + " with " +
+                                        std::to_string(picture.pixels.size()) + " bytes cannot be written");
   auto output = OIIO::ImageOutput::create("png");
   OIIO::ImageSpec spec(picture.width, picture.height, picture.channels, OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", "sRGB");

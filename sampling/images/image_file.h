@@ -11,8 +11,8 @@
 /// Image files through OpenImageIO; the only code that uses it.
 namespace hilbrush {
 
-/// An ImageReader (see model_file.h): PNG, JPEG, GIF, TGA, BMP, TIFF; sRGB to linear light; luminance by Rec. 709.
-/// Truncated and corrupt files are refused even where OpenImageIO reports success.
+/// An ImageReader (see model_file.h): PNG, JPEG, GIF, TGA, BMP, TIFF; sRGB to linear light; luminance by Rec.
+/// 709. Truncated and corrupt files are refused even where OpenImageIO reports success.
 Result<Texture> load_image_file(const std::filesystem::path& file, std::size_t pixel_limit);
 
 /// An 8-bit sRGB-encoded picture for people, row 0 at the top. channels is 1 or 3.

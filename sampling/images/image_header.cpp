@@ -12,8 +12,8 @@ namespace {
 
 using namespace std::string_view_literals;
 
-/// A progressive JPEG is decoded once for each of its scans (ten are usual): the pixels of all its scans may be this
-/// many times the limit of pixels.
+/// A progressive JPEG is decoded once for each of its scans (ten are usual): the pixels of all its scans may
+/// be this many times the limit of pixels.
 constexpr std::size_t kMaxScans = 16;
 
 /// What the header says; zero where it does not say, which the reader finds out.
@@ -44,7 +44,8 @@ Claim png_claim(std::string_view bytes) {
 /// Heights below zero are those of pictures that begin at the top.
 Claim bmp_claim(std::string_view bytes) {
   constexpr std::size_t kCoreHeader = 12;
-  if (little_endian(bytes, 14, 4) == kCoreHeader) return {little_endian(bytes, 18, 2), little_endian(bytes, 20, 2), 1};
+  if (little_endian(bytes, 14, 4) == kCoreHeader)
+    return {little_endian(bytes, 18, 2), little_endian(bytes, 20, 2), 1};
   const auto size_of = [](std::size_t value) {
     return value <= 0x7fffffffu ? value : std::size_t{0x100000000u} - value;
   };
@@ -58,7 +59,9 @@ Claim tga_claim(std::string_view bytes) {
 /// The canvas, and the first frame, which may be larger.
 Claim gif_claim(std::string_view bytes) {
   Claim claim{little_endian(bytes, 6, 2), little_endian(bytes, 8, 2), 1};
-  const auto colors = [](std::size_t flags) { return flags & 0x80u ? std::size_t{3} << ((flags & 7u) + 1) : 0; };
+  const auto colors = [](std::size_t flags) {
+    return flags & 0x80u ? std::size_t{3} << ((flags & 7u) + 1) : 0;
+  };
   std::size_t at = 13 + colors(byte_at(bytes, 10));
   while (byte_at(bytes, at) == 0x21) {  // extensions: a label, then blocks with their lengths, then none
     at += 2;
@@ -82,7 +85,8 @@ Claim jpeg_claim(std::string_view bytes) {
       ++at;
       continue;
     }
-    const bool is_frame = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    const bool is_frame =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (is_frame) {
       claim.height = std::max(claim.height, big_endian(bytes, at + 5, 2));
       claim.width = std::max(claim.width, big_endian(bytes, at + 7, 2));
@@ -97,14 +101,15 @@ Claim jpeg_claim(std::string_view bytes) {
   return claim;
 }
 
-/// libjpeg fills a truncated picture with gray and OpenImageIO calls that success; a whole one has an end marker after
-/// its last scan.
+/// libjpeg fills a truncated picture with gray and OpenImageIO calls that success; a whole one has an end
+/// marker after its last scan.
 bool is_truncated_jpeg(std::string_view bytes) {
   const std::size_t scan = bytes.rfind("\xff\xda"sv);
   return scan == std::string_view::npos || bytes.find("\xff\xd9"sv, scan) == std::string_view::npos;
 }
 
-/// What is wrong with a PNG's chain of chunks, or empty. libpng finds out as well, but writes to stderr first.
+/// What is wrong with a PNG's chain of chunks, or empty. libpng finds out as well, but writes to stderr
+/// first.
 std::string png_fault(std::string_view bytes) {
   constexpr std::size_t kFrame = 12;  // length, name, check sum
   for (std::size_t at = 8; at + kFrame <= bytes.size();) {
@@ -143,22 +148,25 @@ std::string image_format(const std::filesystem::path& file, std::string_view byt
   return "";
 }
 
-std::string fault_before_decoding(const std::string& format, std::string_view bytes, std::size_t pixel_limit) {
+std::string fault_before_decoding(const std::string& format, std::string_view bytes,
+                                  std::size_t pixel_limit) {
   if (format.empty()) return "it is not a PNG, JPEG, GIF, TGA, BMP or TIFF picture";
   const Claim claim = claim_of(format, bytes);
-  if (claim.width > kMaxSidePixels || claim.height > kMaxSidePixels || claim.width * claim.height > pixel_limit)
+  if (claim.width > kMaxSidePixels || claim.height > kMaxSidePixels ||
+      claim.width * claim.height > pixel_limit)
     return too_many_pixels(claim.width, claim.height, pixel_limit);
   if (claim.width * claim.height * claim.passes > kMaxScans * pixel_limit)
-    return "it stores its " + std::to_string(claim.width) + " x " + std::to_string(claim.height) + " pixels in " +
-           std::to_string(claim.passes) + " scans, which take too long to decode; save it again";
+    return "it stores its " + std::to_string(claim.width) + " x " + std::to_string(claim.height) +
+           " pixels in " + std::to_string(claim.passes) +
+           " scans, which take too long to decode; save it again";
   if (format == "jpeg" && is_truncated_jpeg(bytes)) return "the JPEG picture is truncated";
   if (format == "png") return png_fault(bytes);
   return "";
 }
 
 std::string too_many_pixels(std::size_t width, std::size_t height, std::size_t pixel_limit) {
-  return "it has " + std::to_string(width) + " x " + std::to_string(height) + " pixels, more than the limit allows (" +
-         std::to_string(pixel_limit) + " left)";
+  return "it has " + std::to_string(width) + " x " + std::to_string(height) +
+         " pixels, more than the limit allows (" + std::to_string(pixel_limit) + " left)";
 }
 
 }  // namespace hilbrush

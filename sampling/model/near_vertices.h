@@ -10,18 +10,21 @@
 
 namespace hilbrush {
 
-/// Finds vertices that are nearer to each other than a distance, by a grid of much larger cells. Cost O(n log n).
+/// Finds vertices that are nearer to each other than a distance, by a grid of much larger cells. Cost O(n log
+/// n).
 class NearVertices {
  public:
   NearVertices(const std::vector<Eigen::Vector3d>& vertices, double distance)
-      : vertices_(vertices), distance_(distance), low_(vertices.empty() ? Eigen::Vector3d::Zero() : vertices[0]) {
+      : vertices_(vertices),
+        distance_(distance),
+        low_(vertices.empty() ? Eigen::Vector3d::Zero() : vertices[0]) {
     for (const Eigen::Vector3d& p : vertices) low_ = low_.cwiseMin(p);
     for (std::uint32_t v = 0; v < vertices.size(); ++v) cells_.push_back({cell_of(vertices[v]), v});
     std::sort(cells_.begin(), cells_.end());
   }
 
-  /// Calls `visit(v, w)` for pairs of near vertices, v < w: for all of a sparse cell, for a chain of them in a crowded
-  /// one, whose vertices all count as near.
+  /// Calls `visit(v, w)` for pairs of near vertices, v < w: for all of a sparse cell, for a chain of them in
+  /// a crowded one, whose vertices all count as near.
   template <class Visit>
   void for_each_pair(const Visit& visit) const {
     for (auto begin = cells_.begin(); begin != cells_.end();) {
@@ -30,7 +33,8 @@ class NearVertices {
       const bool is_crowded = end - begin > kCrowd;
       for (auto entry = begin; entry != end; ++entry) {
         if (is_crowded && entry != begin) visit(begin->second, entry->second);
-        for (auto other = entry + 1; !is_crowded && other != end; ++other) visit_if_near(*entry, *other, visit);
+        for (auto other = entry + 1; !is_crowded && other != end; ++other)
+          visit_if_near(*entry, *other, visit);
         visit_neighbors(*entry, visit);
       }
       begin = end;
@@ -57,8 +61,8 @@ class NearVertices {
     visit(std::min(a.second, b.second), std::max(a.second, b.second));
   }
 
-  /// The cells that the vertex is so near to that a near one may be in them. Only those of greater order: the others'
-  /// vertices find this one.
+  /// The cells that the vertex is so near to that a near one may be in them. Only those of greater order: the
+  /// others' vertices find this one.
   template <class Visit>
   void visit_neighbors(const Entry& entry, const Visit& visit) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(distance_);
@@ -70,7 +74,8 @@ class NearVertices {
           const Cell cell{x, y, z};
           if (cell <= entry.first) continue;
           auto other = std::lower_bound(cells_.begin(), cells_.end(), Entry{cell, 0});
-          for (std::ptrdiff_t i = 0; i < kCrowd && other != cells_.end() && other->first == cell; ++i, ++other)
+          for (std::ptrdiff_t i = 0; i < kCrowd && other != cells_.end() && other->first == cell;
+               ++i, ++other)
             visit_if_near(entry, *other, visit);
         }
   }

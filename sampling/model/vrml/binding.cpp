@@ -52,17 +52,20 @@ bool flag_of(const Reference& reference, std::string_view field, bool otherwise)
   return n ? n[0] != 0 : otherwise;
 }
 
-Eigen::Vector2d vector2_of(const Reference& reference, std::string_view field, const Eigen::Vector2d& otherwise) {
+Eigen::Vector2d vector2_of(const Reference& reference, std::string_view field,
+                           const Eigen::Vector2d& otherwise) {
   const double* n = numbers(reference, field, 2);
   return n ? Eigen::Vector2d(n[0], n[1]) : otherwise;
 }
 
-Eigen::Vector3d vector3_of(const Reference& reference, std::string_view field, const Eigen::Vector3d& otherwise) {
+Eigen::Vector3d vector3_of(const Reference& reference, std::string_view field,
+                           const Eigen::Vector3d& otherwise) {
   const double* n = numbers(reference, field, 3);
   return n ? Eigen::Vector3d(n[0], n[1], n[2]) : otherwise;
 }
 
-Eigen::Vector4d rotation_of(const Reference& reference, std::string_view field, const Eigen::Vector4d& otherwise) {
+Eigen::Vector4d rotation_of(const Reference& reference, std::string_view field,
+                            const Eigen::Vector4d& otherwise) {
   const double* n = numbers(reference, field, 4);
   return n ? Eigen::Vector4d(n[0], n[1], n[2], n[3]) : otherwise;
 }

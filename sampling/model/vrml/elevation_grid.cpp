@@ -58,15 +58,17 @@ class Corners {
       warnings.push_back(at(*node.node) +
                          ": too few texture coordinates for the ElevationGrid; the default mapping is used");
     if (has_colors_ && colors_.size() < colors_needed)
-      warnings.push_back(at(*node.node) + ": too few colors for the ElevationGrid; the rest get the material's");
+      warnings.push_back(at(*node.node) +
+                         ": too few colors for the ElevationGrid; the rest get the material's");
   }
 
   void add(FaceList& faces, std::size_t x, std::size_t z, std::size_t quad) const {
     const std::size_t point = z * grid_.columns + x;
     faces.corners.push_back(static_cast<std::uint32_t>(point));
-    faces.corner_uv.push_back(has_uv_ ? Eigen::Vector2d(uv_[2 * point], uv_[2 * point + 1])
-                                      : Eigen::Vector2d(static_cast<double>(x) / static_cast<double>(grid_.columns - 1),
-                                                        static_cast<double>(z) / static_cast<double>(grid_.rows - 1)));
+    faces.corner_uv.push_back(
+        has_uv_ ? Eigen::Vector2d(uv_[2 * point], uv_[2 * point + 1])
+                : Eigen::Vector2d(static_cast<double>(x) / static_cast<double>(grid_.columns - 1),
+                                  static_cast<double>(z) / static_cast<double>(grid_.rows - 1)));
     const std::size_t color = is_per_vertex_ ? point : quad;
     if (has_colors_) faces.corner_luminance.push_back(color < colors_.size() ? colors_[color] : otherwise_);
   }

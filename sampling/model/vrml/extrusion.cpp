@@ -31,8 +31,8 @@ bool is_direction(const Vector3d& v) {
   return v.squaredNorm() > 1e-24;
 }
 
-/// Replaces each zero vector by the direction before it, and those at the begin by the first direction. False if there
-/// is not a single direction.
+/// Replaces each zero vector by the direction before it, and those at the begin by the first direction. False
+/// if there is not a single direction.
 bool fill_gaps(std::vector<Vector3d>& directions) {
   const auto first = std::find_if(directions.begin(), directions.end(), is_direction);
   if (first == directions.end()) return false;
@@ -85,16 +85,19 @@ std::vector<Matrix3d> spine_frames(std::vector<Vector3d> spine) {
 template <class Point>
 std::vector<double> arc_fractions(const std::vector<Point>& points) {
   std::vector<double> fractions(points.size(), 0);
-  for (std::size_t i = 1; i < points.size(); ++i) fractions[i] = fractions[i - 1] + (points[i] - points[i - 1]).norm();
+  for (std::size_t i = 1; i < points.size(); ++i)
+    fractions[i] = fractions[i - 1] + (points[i] - points[i - 1]).norm();
   const double length = fractions.back();
   for (std::size_t i = 0; i < fractions.size(); ++i)
-    fractions[i] = length > 0 ? fractions[i] / length : static_cast<double>(i) / static_cast<double>(points.size() - 1);
+    fractions[i] =
+        length > 0 ? fractions[i] / length : static_cast<double>(i) / static_cast<double>(points.size() - 1);
   return fractions;
 }
 
 /// The closed cross-section as one polygon; its bounding square is mapped onto the texture.
 void add_cap(FaceList& faces, const std::vector<Vector2d>& section, std::size_t first_point, bool is_begin) {
-  const std::size_t n = section.size() > 1 && section.front() == section.back() ? section.size() - 1 : section.size();
+  const std::size_t n =
+      section.size() > 1 && section.front() == section.back() ? section.size() - 1 : section.size();
   if (n < 3) return;
   Vector2d low = section[0];
   Vector2d high = section[0];
@@ -111,10 +114,10 @@ void add_cap(FaceList& faces, const std::vector<Vector2d>& section, std::size_t 
   faces.end_face();
 }
 
-/// A point of the cross-section at spine point i, scaled and oriented. Beyond the end of `scale` or `orientation` the
-/// last entry holds.
-Vector3d on_section(const Vector2d& p, const std::vector<double>& scale, const std::vector<double>& orientation,
-                    std::size_t i) {
+/// A point of the cross-section at spine point i, scaled and oriented. Beyond the end of `scale` or
+/// `orientation` the last entry holds.
+Vector3d on_section(const Vector2d& p, const std::vector<double>& scale,
+                    const std::vector<double>& orientation, std::size_t i) {
   Vector2d s(1, 1);
   if (scale.size() >= 2) {
     const std::size_t k = std::min(i, scale.size() / 2 - 1);
@@ -123,7 +126,8 @@ Vector3d on_section(const Vector2d& p, const std::vector<double>& scale, const s
   Vector3d scaled(p.x() * s.x(), 0, p.y() * s.y());
   if (orientation.size() < 4) return scaled;
   const std::size_t k = std::min(i, orientation.size() / 4 - 1);
-  return rotation_matrix({orientation[4 * k], orientation[4 * k + 1], orientation[4 * k + 2], orientation[4 * k + 3]}) *
+  return rotation_matrix(
+             {orientation[4 * k], orientation[4 * k + 1], orientation[4 * k + 2], orientation[4 * k + 3]}) *
          scaled;
 }
 
@@ -133,8 +137,9 @@ FaceList extrusion(const Reference& node, const ModelLimits& limits) {
   const std::vector<Vector2d> section = cross_section_of(node);
   const std::vector<Vector3d> spine = spine_of(node);
   if (section.size() < 2 || spine.size() < 2)
-    throw InputError(at(*node.node), "Extrusion needs at least 2 points in crossSection and in spine, found " +
-                                         std::to_string(section.size()) + " and " + std::to_string(spine.size()));
+    throw InputError(at(*node.node),
+                     "Extrusion needs at least 2 points in crossSection and in spine, found " +
+                         std::to_string(section.size()) + " and " + std::to_string(spine.size()));
   if (section.size() > limits.triangles / spine.size())
     throw InputError(at(*node.node),
                      "Extrusion makes more triangles than the limit of " + std::to_string(limits.triangles));
@@ -163,11 +168,12 @@ FaceList extrusion(const Reference& node, const ModelLimits& limits) {
       add_corner(i + 1, j);
       faces.end_face();
     }
-  // The standard puts caps into the tube of a closed spine as well. They can be neither seen nor hit by the beam, and
-  // would make the tube non-manifold.
+  // The standard puts caps into the tube of a closed spine as well. They can be neither seen nor hit by the
+  // beam, and would make the tube non-manifold.
   const bool is_ring = spine.size() > 2 && spine.front() == spine.back();
   if (!is_ring && flag_of(node, "beginCap", true)) add_cap(faces, section, 0, true);
-  if (!is_ring && flag_of(node, "endCap", true)) add_cap(faces, section, (spine.size() - 1) * section.size(), false);
+  if (!is_ring && flag_of(node, "endCap", true))
+    add_cap(faces, section, (spine.size() - 1) * section.size(), false);
   return faces;
 }
 

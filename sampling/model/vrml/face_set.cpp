@@ -11,7 +11,8 @@ using Eigen::Vector3d;
 /// The list's item at an index that came from a file, or null.
 template <class T>
 const T* item_at(const std::vector<T>& list, double index) {
-  return index >= 0 && index < static_cast<double>(list.size()) ? &list[static_cast<std::size_t>(index)] : nullptr;
+  return index >= 0 && index < static_cast<double>(list.size()) ? &list[static_cast<std::size_t>(index)]
+                                                                : nullptr;
 }
 
 std::vector<Vector2d> pairs_of(const std::vector<double>& numbers) {
@@ -59,8 +60,8 @@ Outlines read_outlines(const std::vector<double>& coord_index, FaceList& faces) 
   return outlines;
 }
 
-void read_texture_coordinates(const Reference& node, const Reference& texture_coordinates, const Outlines& outlines,
-                              FaceList& faces, std::vector<std::string>& warnings) {
+void read_texture_coordinates(const Reference& node, const Reference& texture_coordinates,
+                              const Outlines& outlines, FaceList& faces, std::vector<std::string>& warnings) {
   const std::vector<Vector2d> points = pairs_of(numbers_of(texture_coordinates, "point"));
   if (points.empty()) return;  // as exporters write what they do not use
   const CornerIndices index(numbers_of(node, "texCoordIndex"), numbers_of(node, "coordIndex"));
@@ -73,7 +74,8 @@ void read_texture_coordinates(const Reference& node, const Reference& texture_co
   if (missing == 0) return;
   const bool is_useless = 2 * missing > faces.corner_uv.size();
   if (is_useless) faces.corner_uv.clear();
-  warnings.push_back(faces.at + ": " + std::to_string(missing) + " of " + std::to_string(faces.corners.size()) +
+  warnings.push_back(faces.at + ": " + std::to_string(missing) + " of " +
+                     std::to_string(faces.corners.size()) +
                      " corners name texture coordinates that do not exist; " +
                      (is_useless ? "the default mapping is used" : "they get 0 0"));
 }
@@ -103,7 +105,8 @@ void read_colors(const Reference& node, const Reference& colors, const Outlines&
     }
   }
   if (missing > 0)
-    warnings.push_back(faces.at + ": " + std::to_string(missing) + " of " + std::to_string(faces.corners.size()) +
+    warnings.push_back(faces.at + ": " + std::to_string(missing) + " of " +
+                       std::to_string(faces.corners.size()) +
                        " corners name colors that do not exist; they get the material's");
 }
 
@@ -111,7 +114,8 @@ void read_colors(const Reference& node, const Reference& colors, const Outlines&
 
 std::vector<Vector3d> points_of(const std::vector<double>& numbers) {
   std::vector<Vector3d> points(numbers.size() / 3);
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i] = {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
   return points;
 }
 
@@ -134,7 +138,8 @@ FaceList indexed_face_set(const Reference& node, const SurfaceParts& parts, floa
     warnings.push_back(faces.at + ": " + std::to_string(outlines.dropped) +
                        " faces were dropped: they name points that do not exist (there are " +
                        std::to_string(faces.points.size()) + ")");
-  if (parts.texture_coordinates) read_texture_coordinates(node, parts.texture_coordinates, outlines, faces, warnings);
+  if (parts.texture_coordinates)
+    read_texture_coordinates(node, parts.texture_coordinates, outlines, faces, warnings);
   if (parts.colors) read_colors(node, parts.colors, outlines, otherwise, faces, warnings);
   return faces;
 }

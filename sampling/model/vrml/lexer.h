@@ -3,8 +3,8 @@
 #include <string>
 #include <string_view>
 
-/// VRML text to tokens, for versions 1.0 and 2.0 alike. Commas are white space, comments are skipped, lines are counted
-/// at LF, CR and CR LF. Bytes above 127 may stand in names and strings.
+/// VRML text to tokens, for versions 1.0 and 2.0 alike. Commas are white space, comments are skipped, lines
+/// are counted at LF, CR and CR LF. Bytes above 127 may stand in names and strings.
 namespace hilbrush::vrml {
 
 enum class TokenKind { kWord, kNumber, kString, kPunctuation, kEnd };

@@ -14,8 +14,9 @@ struct ParseBudget {
   std::size_t values = 0;
 };
 
-/// Reads VRML text. Accepts what exporters write beside the standard: a missing or odd header, a byte order mark, a DEF
-/// without a name, USE of an unknown name, lists without brackets; each such thing is a warning "file:line: ...".
+/// Reads VRML text. Accepts what exporters write beside the standard: a missing or odd header, a byte order
+/// mark, a DEF without a name, USE of an unknown name, lists without brackets; each such thing is a warning
+/// "file:line: ...".
 /// @throws InputError "file:line" with what was expected and found, or with the limit that is exceeded.
 /// Cost: one pass, memory about 10 times the text.
 Scene parse(std::string_view text, const std::string& file, const ModelLimits& limits, ParseBudget& budget,

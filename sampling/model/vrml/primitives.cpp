@@ -9,8 +9,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// On a circle about y, at the fraction s of a turn that starts at the back (-z) and runs counter-clockwise seen from
-/// above.
+/// On a circle about y, at the fraction s of a turn that starts at the back (-z) and runs counter-clockwise
+/// seen from above.
 Vector3d on_circle(double s, double radius, double y) {
   const double angle = 2 * std::numbers::pi * s;
   return {-radius * std::sin(angle), y, -radius * std::cos(angle)};
@@ -48,7 +48,8 @@ void add_band(FaceList& faces, std::uint32_t lower, std::uint32_t upper, double 
 }
 
 /// Triangles from a ring to one point above (or below) it.
-void add_fan(FaceList& faces, std::uint32_t ring, std::uint32_t tip, bool is_tip_above, double v_ring, double v_tip) {
+void add_fan(FaceList& faces, std::uint32_t ring, std::uint32_t tip, bool is_tip_above, double v_ring,
+             double v_tip) {
   for (int i = 0; i < kSegments; ++i) {
     const int from = is_tip_above ? i : i + 1;
     const int to = is_tip_above ? i + 1 : i;
@@ -59,8 +60,8 @@ void add_fan(FaceList& faces, std::uint32_t ring, std::uint32_t tip, bool is_tip
   }
 }
 
-/// A disc on a ring, showing the circle cut out of the texture's middle, upright when tipped towards +z (a top) or -z
-/// (a bottom).
+/// A disc on a ring, showing the circle cut out of the texture's middle, upright when tipped towards +z (a
+/// top) or -z (a bottom).
 void add_disc(FaceList& faces, std::uint32_t ring, double radius, bool is_top) {
   for (int i = 0; i < kSegments; ++i) {
     const std::uint32_t point = on_ring(ring, is_top ? i : kSegments - i);

@@ -3,8 +3,8 @@
 
 #include "sampling/model/files/face_list.h"
 
-/// VRML's solids as polygons with their texture mapping (VRML97, 6.6, 6.11, 6.14, 6.42). Round ones have `kSegments`
-/// sides: within .1 % of the radius of the true surface.
+/// VRML's solids as polygons with their texture mapping (VRML97, 6.6, 6.11, 6.14, 6.42). Round ones have
+/// `kSegments` sides: within .1 % of the radius of the true surface.
 namespace hilbrush::vrml {
 
 constexpr int kSegments = 72;

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-/// The node tree of one VRML file as it was written: any node, any field, nothing interpreted. DEF/USE share nodes;
-/// PROTOs are kept as templates and bound when the tree is walked (see binding.h), so a small file stays small in
-/// memory whatever it expands to.
+/// The node tree of one VRML file as it was written: any node, any field, nothing interpreted. DEF/USE share
+/// nodes; PROTOs are kept as templates and bound when the tree is walked (see binding.h), so a small file
+/// stays small in memory whatever it expands to.
 namespace hilbrush::vrml {
 
 struct Node;
@@ -28,7 +28,8 @@ struct Field {
   int line = 0;
 };
 
-/// A PROTO's interface with defaults, and the first node of its body (the others, scripts and routes, have no shape).
+/// A PROTO's interface with defaults, and the first node of its body (the others, scripts and routes, have no
+/// shape).
 struct Prototype {
   std::string name;
   std::vector<Field> defaults;
@@ -38,7 +39,7 @@ struct Prototype {
 struct Node {
   std::string type;
   std::vector<Field> fields;
-  std::vector<NodePointer> children;           ///< VRML 1.0: nodes that stand in the body without a field name
+  std::vector<NodePointer> children;  ///< VRML 1.0: nodes that stand in the body without a field name
   std::shared_ptr<const Prototype> prototype;  ///< not null: an instance of it
   std::shared_ptr<const std::string> file;     ///< for messages
   int line = 0;

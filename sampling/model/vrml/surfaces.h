@@ -3,8 +3,8 @@
 #include "sampling/model/model_file.h"
 #include "sampling/model/vrml/binding.h"
 
-/// The geometry nodes of VRML97 that hold their own numbers, as polygons. A Color or TextureCoordinate node is passed
-/// in resolved (PROTO instances and USE followed); a null reference means there is none.
+/// The geometry nodes of VRML97 that hold their own numbers, as polygons. A Color or TextureCoordinate node
+/// is passed in resolved (PROTO instances and USE followed); a null reference means there is none.
 namespace hilbrush::vrml {
 
 /// The nodes a surface refers to.
@@ -14,8 +14,8 @@ struct SurfaceParts {
   Reference texture_coordinates;
 };
 
-/// IndexedFaceSet (6.23). Faces that use a point that does not exist are dropped with a warning; colors and texture
-/// coordinates that do not exist fall back to `otherwise` and to the default mapping.
+/// IndexedFaceSet (6.23). Faces that use a point that does not exist are dropped with a warning; colors and
+/// texture coordinates that do not exist fall back to `otherwise` and to the default mapping.
 FaceList indexed_face_set(const Reference& node, const SurfaceParts& parts, float otherwise,
                           std::vector<std::string>& warnings);
 
@@ -30,8 +30,8 @@ FaceList extrusion(const Reference& node, const ModelLimits& limits);
 std::vector<Eigen::Vector3d> points_of(const std::vector<double>& numbers);
 std::vector<float> luminances_of(const std::vector<double>& numbers);
 
-/// Layout of an index list as VRML writes it: one entry a corner and -1 after each face, or (when it is empty)
-/// `fallback`.
+/// Layout of an index list as VRML writes it: one entry a corner and -1 after each face, or (when it is
+/// empty) `fallback`.
 class CornerIndices {
  public:
   CornerIndices(const std::vector<double>& indices, const std::vector<double>& fallback)
