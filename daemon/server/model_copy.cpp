@@ -52,8 +52,8 @@ std::vector<gid_t> groups_of(uid_t uid, gid_t gid) {
   return groups;
 }
 
-/// What the path leads to is found out before it is opened: opening a device may already act on it, and opening a
-/// pipe waits for its writer.
+/// What the path leads to is found out before it is opened: opening a device may already act on it, and
+/// opening a pipe waits for its writer.
 int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
   const AsPeer peer(uid, gid);
   const auto refuse = [&] { throw InputError(file.string(), std::string("cannot be read: ") + std::strerror(errno)); };
@@ -68,8 +68,8 @@ int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
   return fd;
 }
 
-/// Relative to `base`. The folder may have been reached by a link; whether the file itself is one was looked at when
-/// the list was made.
+/// Relative to `base`. The folder may have been reached by a link; whether the file itself is one was looked
+/// at when the list was made.
 fs::path place_below(const fs::path& file, const fs::path& base) {
   std::error_code error;
   const fs::path folder = fs::canonical(fs::absolute(file).parent_path(), error);
@@ -132,9 +132,9 @@ ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, 
   if (files.size() > kModelFilesMax)
     throw InputError(model.string(), "refers to more than " + std::to_string(kModelFilesMax) + " files");
   std::error_code ignored;
-  std::error_code error;
-  const fs::path base = fs::canonical(fs::absolute(model).parent_path(), error);  // as the files' paths are
-  if (error) throw InputError(model.string(), "cannot be read: " + error.message());
+  std::error_code absence;
+  const fs::path base = fs::canonical(fs::absolute(model).parent_path(), absence);  // as the files' paths are
+  if (absence) throw InputError(model.string(), "cannot be read: " + absence.message());
   fs::remove_all(target, ignored);
   try {
     Sha256 hash;
