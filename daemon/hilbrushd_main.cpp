@@ -4,6 +4,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -118,6 +119,8 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("hilbrushd"));
   spdlog::set_level(spdlog::level::from_str(level));
   ::signal(SIGPIPE, SIG_IGN);
+  ::signal(SIGHUP, SIG_IGN);   // a terminal that is closed must not end a painting job
+  ::umask(::umask(0) | 0027);  // jobs and the audit log are for the daemon's user and group only
   ::signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write, and does not end the daemon
   raise_descriptor_limit();
   try {

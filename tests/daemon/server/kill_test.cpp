@@ -3,6 +3,7 @@
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -48,6 +49,25 @@ void expect_painted_once(const std::filesystem::path& folder, const Json& job) {
   }
 }
 
+/// As when the terminal that it was started from is closed.
+TEST(ServerKillTest, AHangUpEndsNothingAndFilesAreForOwnerAndGroupWhateverTheUmask) {
+  if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
+  DaemonWorld world;
+  const mode_t before = ::umask(0);
+  DaemonProcess daemon(world.options);
+  ::umask(before);
+  const auto client = connect(world.options);
+  ASSERT_EQ(::kill(daemon.pid(), SIGHUP), 0);
+  EXPECT_EQ(client->result("cell.status").at("cell").at("state"), "stopped");
+  const std::string id = world.submit(*client, world.model("cup.wrl", 5), "done", true);
+  using std::filesystem::perms;
+  for (const auto& file : {world.options.state / "jobs.sqlite", world.options.state / "audit.log", world.job_folder(id),
+                           world.job_folder(id) / "job.json"})
+    EXPECT_EQ(std::filesystem::status(file).permissions() & (perms::others_all | perms::group_write), perms::none)
+        << file;
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
+}
+
 TEST(ServerKillTest, AKilledDaemonLeavesAtMostOneDotInDoubtAndTheRestIsPaintedOnce) {
   if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
   DaemonWorld world;
@@ -83,7 +103,8 @@ TEST(ServerKillTest, AKilledDaemonLeavesAtMostOneDotInDoubtAndTheRestIsPaintedOn
   }
 }
 
-/// SIGSTOP holds every thread; the clock and the cell go on. What it meets afterwards is as after any silence.
+/// SIGSTOP holds every thread; the clock and the cell go on. What it meets afterwards is as after any
+/// silence.
 TEST(ServerKillTest, AFrozenDaemonExposesNothingTwiceWhenItGoesOn) {
   if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
   DaemonWorld world;
@@ -122,8 +143,8 @@ TEST(ServerKillTest, AFrozenDaemonExposesNothingTwiceWhenItGoesOn) {
   EXPECT_EQ(daemon.end(SIGTERM), 0);
 }
 
-/// As a disk that fills up: no file may grow any more. The daemon lives, answers, stops the job, and goes on when there
-/// is room again.
+/// As a disk that fills up: no file may grow any more. The daemon lives, answers, stops the job, and goes on
+/// when there is room again.
 TEST(ServerKillTest, AFullDiskStopsTheJobAndNothingElse) {
   if (!is_built()) GTEST_SKIP() << "hilbrushd is not built";
   DaemonWorld world;
