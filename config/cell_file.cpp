@@ -161,6 +161,18 @@ void read_timing(JsonObject& json, CellDescription::Timing& timing) {
   if (timing.settle_min_s > timing.settle_max_s) json.refuse("settle_max_ms", "below settle_min_ms");
 }
 
+/// A cell file that does not say how its controllers lead their joints gets moves that are clear in any case.
+void read_interpolation(JsonObject& json, CellDescription::Motion& motion) {
+  constexpr std::array kInterpolations{Interpolation::kUnknown, Interpolation::kIndependent,
+                                       Interpolation::kCoordinated};
+  const auto read = [&](const char* chain, Interpolation& interpolation) {
+    if (json.has(chain)) interpolation = kInterpolations[json.choice(chain, {"unknown", "independent", "coordinated"})];
+  };
+  read("robot", motion.robot);
+  read("table", motion.table);
+  if (json.has("start_lag_ms")) motion.start_lag_s = json.quantity("start_lag_ms", {0, 200});
+}
+
 /// Reads what jobs report in `timing.measured`.
 void read_measured(JsonObject& json, CellDescription& cell) {
   if (json.has("move_delay_ms")) cell.timing.move_delay_s = json.quantity("move_delay_ms", {0, 10000});
@@ -190,6 +202,8 @@ CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOp
   json.object("laser", [&](JsonObject& laser) { read_laser(laser, cell.laser); });
   json.object("paint", [&](JsonObject& paint) { read_paint(paint, cell.paint); });
   json.object("timing", [&](JsonObject& timing) { read_timing(timing, cell.timing); });
+  if (json.has("interpolation"))
+    json.object("interpolation", [&](JsonObject& motion) { read_interpolation(motion, cell.motion); });
   if (json.has("measured")) json.object("measured", [&](JsonObject& measured) { read_measured(measured, cell); });
   json.object("devices", [&](JsonObject& devices) { device_options = read_cell_devices(devices, cell, folder); });
   json.object("simulation", [&](JsonObject& simulation) {

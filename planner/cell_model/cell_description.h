@@ -29,6 +29,20 @@ inline constexpr std::size_t kRotation = 5;
 using Joints = std::array<double, kAxisCount>;
 inline constexpr std::array<const char*, kAxisCount> kAxisNames{"j1", "j2", "j3", "j4", "a", "c"};
 
+/// The joints that one controller moves.
+struct Chain {
+  std::size_t first, count;
+};
+inline constexpr Chain kRobotChain{kJ1, 4};
+inline constexpr Chain kTableChain{kTilt, 2};
+
+/// How a controller leads its joints from rest to rest.
+enum class Interpolation {
+  kUnknown,      ///< moves must be clear under both of the others; time model and simulation take kIndependent
+  kIndependent,  ///< each joint at its own limits: all start together, each arrives when it can
+  kCoordinated   ///< one time law for all joints, slow enough for each: a straight line in joint space
+};
+
 struct AxisDescription {
   double min = 0, max = 0;       ///< rad or m
   double speed_max = 0;          ///< rad/s or m/s
@@ -110,6 +124,11 @@ struct CellDescription {
     double message_s = 0;     ///< duration of one exchange with the devices
     double move_delay_s = 0;  ///< measured, added to each move
   } timing;
+  struct Motion {
+    Interpolation robot = Interpolation::kUnknown;
+    Interpolation table = Interpolation::kUnknown;
+    double start_lag_s = .02;  ///< either chain may start this much later than the other
+  } motion;
   struct Simulation {
     double time_scale = 0;  ///< wall seconds of one cell second: 1 real time, 0 virtual (as fast as possible)
   } simulation;

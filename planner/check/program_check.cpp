@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "planner/check/check_cell.h"
 #include "sampling/base/angles.h"
@@ -18,6 +19,7 @@ constexpr double kJointTolerance = 1e-9;
 constexpr double kIncidenceTolerance = 1e-5;  // rad: normals and incidences are kept in single precision
 constexpr double kEnergyTolerance = 1e-5;     // relative, for the same reason
 constexpr double kCheckStepM = 3e-3;          // along moves, between two checks of the clearance
+constexpr double kGapOnLegsM = .3e-3;         // kept around lens and quill along moves
 constexpr std::size_t kCheckBlock = 512;
 
 using Faults = std::vector<ProgramFault>;
@@ -38,11 +40,85 @@ double axis_end_s(double distance, const AxisDescription& axis) {
   return peak > 0 ? distance / peak + peak / axis.acceleration_max : 0;
 }
 
+/// The cell with a longer and wider lens and quill: what does not touch them keeps the gap to the true ones.
+CellDescription with_gap(CellDescription cell, double gap_m) {
+  cell.lens.radius_m += gap_m;
+  cell.lens.near_m -= gap_m;
+  cell.lens.far_m += gap_m;
+  cell.arm.quill_radius_m += gap_m;
+  return cell;
+}
+
+/// The joints first..last of one controller on their way. All of them take the share of the move that the weakest
+/// allows, or each its own.
+class ControllerMove {
+ public:
+  ControllerMove(const CellDescription& cell, std::size_t first, std::size_t last, const Joints& from, const Joints& to,
+                 bool is_coordinated)
+      : cell_(cell), first_(first), last_(last), from_(from), to_(to), is_coordinated_(is_coordinated) {
+    whole_.speed_max = whole_.acceleration_max = std::numeric_limits<double>::infinity();
+    for (std::size_t axis = first; axis <= last; ++axis) {
+      const double distance = std::abs(to[axis] - from[axis]);
+      if (!(distance > 0)) continue;
+      ++moving_;
+      const AxisDescription& limits = cell.axes[axis];
+      end_s_ = std::max(end_s_, limits.time_factor * axis_end_s(distance, limits));
+      whole_.speed_max = std::min(whole_.speed_max, limits.speed_max / distance);
+      whole_.acceleration_max = std::min(whole_.acceleration_max, limits.acceleration_max / distance);
+      factor_ = std::max(moving_ == 1 ? 0 : factor_, limits.time_factor);
+    }
+    if (is_coordinated_ && moving_ > 0) end_s_ = factor_ * axis_end_s(1, whole_);
+  }
+
+  int moving() const { return moving_; }
+  double end_s() const { return end_s_; }
+  void put(double time_s, Joints& now) const {
+    time_s = std::max(time_s, 0.);
+    for (std::size_t axis = first_; axis <= last_; ++axis) {
+      const double distance = to_[axis] - from_[axis];
+      if (distance == 0) continue;
+      const double factor = cell_.axes[axis].time_factor;
+      now[axis] =
+          is_coordinated_
+              ? from_[axis] + distance * axis_position(1, time_s / factor_, whole_)
+              : from_[axis] +
+                    std::copysign(axis_position(std::abs(distance), time_s / factor, cell_.axes[axis]), distance);
+    }
+  }
+
+ private:
+  const CellDescription& cell_;
+  std::size_t first_, last_;
+  const Joints& from_;
+  const Joints& to_;
+  bool is_coordinated_;
+  int moving_ = 0;
+  double end_s_ = 0, factor_ = 1;
+  AxisDescription whole_;
+};
+
+/// The motions that one controller may make.
+std::vector<ControllerMove> controller_moves(const CellDescription& cell, std::size_t first, std::size_t last,
+                                             Interpolation interpolation, const Joints& from, const Joints& to) {
+  std::vector<ControllerMove> moves;
+  if (interpolation != Interpolation::kCoordinated) moves.emplace_back(cell, first, last, from, to, false);
+  // Of one joint both are the same.
+  if (interpolation == Interpolation::kCoordinated ||
+      (interpolation == Interpolation::kUnknown && moves[0].moving() > 1))
+    moves.emplace_back(cell, first, last, from, to, true);
+  return moves;
+}
+
 class ProgramCheck {
  public:
   ProgramCheck(const ExposureProgram& program, const DotSequence& dots, const TexturedMesh& mesh,
                const CellDescription& cell, const PlanOptions& options)
-      : program_(program), dots_(dots), cell_(cell), options_(options), check_cell_(mesh, cell) {}
+      : program_(program),
+        dots_(dots),
+        cell_(cell),
+        options_(options),
+        check_cell_(mesh, cell),
+        wide_cell_(mesh, with_gap(cell, kGapOnLegsM)) {}
 
   void check_counts(const std::vector<SkippedDot>& skipped, Faults& faults) const;
   void check_vias(Faults& faults) const;
@@ -59,12 +135,16 @@ class ProgramCheck {
   void check_dose(std::size_t i, Faults& faults) const;
   void check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
   void check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const;
+  /// What is touched on this leg with these motions, the robot or the table late; empty if nothing.
+  std::string motion_fault(const ControllerMove& robot, const ControllerMove& table, double robot_late_s,
+                           double table_late_s, int step_count, const Joints& from) const;
 
   const ExposureProgram& program_;
   const DotSequence& dots_;
   const CellDescription& cell_;
   const PlanOptions& options_;
   CheckCell check_cell_;
+  CheckCell wide_cell_;  ///< with a gap around lens and quill
 };
 
 void ProgramCheck::check_counts(const std::vector<SkippedDot>& skipped, Faults& faults) const {
@@ -207,31 +287,37 @@ void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::s
   }
 }
 
+std::string ProgramCheck::motion_fault(const ControllerMove& robot, const ControllerMove& table, double robot_late_s,
+                                       double table_late_s, int step_count, const Joints& from) const {
+  const double end_s = std::max(robot.end_s() + robot_late_s, table.end_s() + table_late_s);
+  for (int k = 1; k <= step_count; ++k) {
+    Joints now = from;
+    robot.put(end_s * k / step_count - robot_late_s, now);
+    table.put(end_s * k / step_count - table_late_s, now);
+    if (std::string fault = wide_cell_.body_fault(now); !fault.empty()) return fault;
+  }
+  return {};
+}
+
 void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
   if (from == to) return;
-  double end_s = 0;
   double sweep_m = 0;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const double distance = std::abs(to[axis] - from[axis]);
-    end_s = std::max(end_s, axis_end_s(distance, cell_.axes[axis]));
-    sweep_m += distance * (axis == kJ3 ? 1 : .25);
-  }
-  const Eigen::Isometry3d X_from = check_cell_.X_OF(from);
-  const Eigen::Isometry3d X_to = check_cell_.X_OF(to);
-  const double travel_m = check_cell_.travel_m(X_from, X_to);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    sweep_m += std::abs(to[axis] - from[axis]) * (axis == kJ3 ? 1 : .25);
+  const double travel_m = check_cell_.travel_m(check_cell_.X_OF(from), check_cell_.X_OF(to));
   if (travel_m < kCheckStepM && sweep_m < 4 * kCheckStepM) return;  // both ends are checked as poses
   const int step_count = static_cast<int>(std::ceil(std::max(travel_m, sweep_m) / kCheckStepM));
-  for (int k = 1; k <= step_count; ++k) {
-    Joints now = to;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      now[axis] = from[axis] + std::copysign(axis_position(std::abs(to[axis] - from[axis]), end_s * k / step_count,
-                                                           cell_.axes[axis]),
-                                             to[axis] - from[axis]);
-    const std::string fault = check_cell_.body_fault(now);
-    if (fault.empty()) continue;
-    faults.push_back({"on the path there, " + fault, i});
-    return;
-  }
+  const double late_s = cell_.motion.start_lag_s;
+  for (const ControllerMove& robot : controller_moves(cell_, kJ1, kJ4, cell_.motion.robot, from, to))
+    for (const ControllerMove& table : controller_moves(cell_, kTilt, kRotation, cell_.motion.table, from, to)) {
+      const bool has_lag = late_s > 0 && robot.moving() > 0 && table.moving() > 0;
+      std::string fault = motion_fault(robot, table, 0, 0, step_count, from);
+      if (fault.empty() && has_lag) fault = motion_fault(robot, table, late_s, 0, step_count, from);
+      if (fault.empty() && has_lag) fault = motion_fault(robot, table, 0, late_s, step_count, from);
+      if (fault.empty()) continue;
+      faults.push_back({fmt::format("on the path there, {} or comes within {:.1f} mm", fault, kGapOnLegsM * 1e3), i});
+      return;
+    }
 }
 
 void ProgramCheck::check_path(std::size_t i, Faults& faults) const {

@@ -21,11 +21,13 @@ inline ArmJoints arm_of(const Joints& joints) {
 class StepCost {
  public:
   explicit StepCost(const CellDescription& cell)
-      : tick_s_(static_cast<float>(cell.timing.tick_s)),
+      : is_coordinated_(cell.motion.robot == Interpolation::kCoordinated),
+        tick_s_(static_cast<float>(cell.timing.tick_s)),
         settle_span_s_(static_cast<float>(cell.timing.settle_max_s - cell.timing.settle_min_s)) {
     for (std::size_t i = 0; i < 4; ++i) {
       const AxisDescription& axis = cell.axes[i];
       const double factor = axis.time_factor;
+      factor_[i] = static_cast<float>(factor);
       inverse_acceleration_[i] = static_cast<float>(factor * factor / axis.acceleration_max);
       ramps_[i] = static_cast<float>(axis.speed_max * axis.speed_max / axis.acceleration_max);
       inverse_speed_[i] = static_cast<float>(factor / axis.speed_max);
@@ -78,20 +80,43 @@ class StepCost {
   }
 
   float cost_s(const ArmJoints& step) const {
+    float share = 0;
+    for (std::size_t i = 0; i < 4; ++i) share = std::max(share, std::abs(step[i]) * inverse_saturation_[i]);
+    float move_s = is_coordinated_ ? coordinated_s(step) : independent_s(step);
+    if (tick_s_ > 0) move_s = whole_ticks(move_s / tick_s_ - 1e-4F) * tick_s_;
+    return move_s + settle_span_s_ * std::min(1.F, share);
+  }
+
+  float independent_s(const ArmJoints& step) const {
     float ramping = 0;     // of the slowest axis that does not reach full speed
     float cruising_s = 0;  // of the slowest axis that does
-    float share = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       const float distance = std::abs(step[i]);
-      share = std::max(share, distance * inverse_saturation_[i]);
       if (distance <= ramps_[i])
         ramping = std::max(ramping, distance * inverse_acceleration_[i]);
       else
         cruising_s = std::max(cruising_s, distance * inverse_speed_[i] + ramp_s_[i]);
     }
-    float move_s = std::max(cruising_s, 2 * std::sqrt(ramping));
-    if (tick_s_ > 0) move_s = whole_ticks(move_s / tick_s_ - 1e-4F) * tick_s_;
-    return move_s + settle_span_s_ * std::min(1.F, share);
+    return std::max(cruising_s, 2 * std::sqrt(ramping));
+  }
+
+  /// All joints by the law that the weakest allows: the move is 1 long.
+  float coordinated_s(const ArmJoints& step) const {
+    float per_speed_s = 0;          // 1 over the speed that all joints allow
+    float per_acceleration_s2 = 0;  // 1 over the acceleration
+    float factor = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const float distance = std::abs(step[i]);
+      if (distance <= 0) continue;
+      per_speed_s = std::max(per_speed_s, distance * inverse_speed_[i] / factor_[i]);
+      per_acceleration_s2 =
+          std::max(per_acceleration_s2, distance * inverse_acceleration_[i] / (factor_[i] * factor_[i]));
+      factor = std::max(factor, factor_[i]);
+    }
+    if (per_speed_s <= 0) return 0;
+    const bool is_triangle = per_speed_s * per_speed_s <= per_acceleration_s2;
+    return factor *
+           (is_triangle ? 2 * std::sqrt(per_acceleration_s2) : per_speed_s + per_acceleration_s2 / per_speed_s);
   }
 
   /// std::ceil of what is over -1 and far below the largest int, which without SSE 4.1 is a call.
@@ -124,7 +149,9 @@ class StepCost {
     return best;
   }
 
+  bool is_coordinated_;
   float tick_s_, settle_span_s_;
+  std::array<float, 4> factor_{};
   std::array<float, 4> inverse_acceleration_{}, ramps_{}, inverse_speed_{}, ramp_s_{}, inverse_saturation_{};
 };
 

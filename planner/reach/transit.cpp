@@ -9,24 +9,17 @@
 namespace hilbrush {
 namespace {
 
-/// The distance that the tool keeps from everything while it moves; less than half of Clearance::kMarginM.
-constexpr double kMinSlackM = .4e-3;
+/// The distance that the tool keeps from everything where a move is looked at; half of Clearance::kMarginM.
+constexpr double kMinSlackM = .5e-3;
 /// ... unless it starts nearer, because it was stopped there: it may leave such a pose.
 constexpr double kMinSlackOfEscapeM = .05e-3;
+/// The share of that distance which it keeps for certain in between. The program check wants .3 mm around the lens, and
+/// looks at a lens that is longer and wider by as much: .42 mm at its rim.
+constexpr double kKeptShare = .86;
+/// Looks at one leg under one law; those that need more pass something closely over a long distance.
+constexpr int kMaxLooks = 3000;
 /// How far the tool backs off along its beam, tried in this order.
 constexpr double kBackOffsM[] = {.005, .01, .02, .03, .045, .06, .08, .1};
-
-/// Distance covered `time_s` into a move over `distance` from rest to rest.
-double covered(double distance, const AxisDescription& axis, double time_s) {
-  const double v = axis.speed_max;
-  const double a = axis.acceleration_max;
-  const double whole_s = trapezoid_s(distance, v, a);
-  if (time_s >= whole_s) return distance;
-  const double ramp_s = std::min(v / a, whole_s / 2);
-  if (time_s <= ramp_s) return .5 * a * time_s * time_s;
-  if (time_s >= whole_s - ramp_s) return distance - .5 * a * (whole_s - time_s) * (whole_s - time_s);
-  return .5 * a * ramp_s * ramp_s + v * (time_s - ramp_s);
-}
 
 Elbow elbow_of(const Joints& joints) {
   return joints[kJ2] >= 0 ? Elbow::kPositive : Elbow::kNegative;
@@ -40,17 +33,7 @@ bool Transit::needs_retract(const Joints& from, const Joints& to) {
          std::abs(to[kRotation] - from[kRotation]) > kHalfTurn;
 }
 
-Joints joints_during(const CellDescription& cell, const Joints& from, const Joints& to, double time_s) {
-  Joints now = to;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double distance = to[i] - from[i];
-    if (distance == 0) continue;
-    now[i] = from[i] + std::copysign(covered(std::abs(distance), cell.axes[i], time_s), distance);
-  }
-  return now;
-}
-
-double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
+double Transit::arm_travel_bound_m(const Joints& a, const Joints& b, bool is_one_law) const {
   const auto& arm = reach_.cell().arm;
   const auto& lens = reach_.cell().lens;
   // From the flange's axis to the farthest point of lens or quill, horizontally.
@@ -67,50 +50,119 @@ double Transit::travel_bound_m(const Joints& a, const Joints& b) const {
   double left = 0;
   double right = 0;
   for (const std::size_t axis : {kJ1, kJ2, kJ4}) (b[axis] > a[axis] ? left : right) += std::abs(b[axis] - a[axis]);
-  const double yaw_change = std::max(left, right);
+  const double yaw_change = is_one_law ? std::max(left, right) : left + right;
   // With the arm folded the elbow is the farthest point of the links.
-  return moved(kJ1) * std::max(flange_m, l1) + moved(kJ2) * l2 + yaw_change * tool_m + moved(kJ3) +
-         moved(kTilt) * reach_.clearance().radius_around_tilt_m() +
-         moved(kRotation) * reach_.clearance().radius_around_rotation_m();
+  return moved(kJ1) * std::max(flange_m, l1) + moved(kJ2) * l2 + yaw_change * tool_m + moved(kJ3);
 }
 
-double Transit::least_slack_m(const Joints& from) const {
-  const double slack_m = reach_.clearance().slack_m(reach_.kinematics(), from);
-  return std::clamp(.5 * slack_m, kMinSlackOfEscapeM, kMinSlackM);
+double Transit::table_travel_bound_m(const Joints& a, const Joints& b) const {
+  return std::abs(b[kTilt] - a[kTilt]) * reach_.clearance().radius_around_tilt_m() +
+         std::abs(b[kRotation] - a[kRotation]) * reach_.clearance().radius_around_rotation_m();
+}
+
+Transit::Limits Transit::limits_from(double slack_m) const {
+  const double refused_m = slack_m >= kMinSlackM ? kMinSlackM : std::max(.5 * slack_m, kMinSlackOfEscapeM);
+  return {refused_m, kKeptShare * refused_m};
 }
 
 bool Transit::is_clear_at(const Joints& joints) const {
-  return reach_.clearance().slack_m(reach_.kinematics(), joints) >= kMinSlackM;
+  return slack_m(joints) >= kMinSlackM;
 }
 
-bool Transit::is_clear(const Joints& from, const Joints& to) const {
-  const double least_m = least_slack_m(from);
-  const auto slack_at = [&](const Joints& joints) { return reach_.clearance().slack_m(reach_.kinematics(), joints); };
-  double slack_m = slack_at(from);
-  if (travel_bound_m(from, to) <= slack_m) return true;
-  if (slack_at(to) < kMinSlackM) return false;
+/// One leg with one law for each chain. Boxes of time and lag cover all that can happen: in each, nothing moves farther
+/// from the middle than the clearance there, less what is to be kept.
+class Transit::Leg {
+ public:
+  struct Law {
+    Interpolation robot, table;
+    bool is_table_late;  ///< else the robot
+  };
 
-  double end_s = 0;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    end_s = std::max(end_s, trapezoid_s(std::abs(to[i] - from[i]), reach_.cell().axes[i].speed_max,
-                                        reach_.cell().axes[i].acceleration_max));
-  Joints now = from;
-  double now_s = 0;
-  double step_s = end_s / 4;
-  while (true) {
-    if (slack_m < least_m) return false;
-    if (travel_bound_m(now, to) <= slack_m) return true;
-    // The axes do not reverse during a move, so the bound between two moments holds for all between them.
-    step_s = std::min(2 * step_s, end_s - now_s);
-    Joints next = joints_during(reach_.cell(), from, to, now_s + step_s);
-    while (travel_bound_m(now, next) > slack_m) {
-      step_s /= 2;
-      next = joints_during(reach_.cell(), from, to, now_s + step_s);
-    }
-    now_s += step_s;
-    now = next;
-    slack_m = slack_at(now);
+  Leg(const Transit& transit, const Joints& from, const Joints& to, const Limits& limits, const Law& law)
+      : transit_(transit), cell_(transit.reach_.cell()), from_(from), to_(to), limits_(limits), law_(law) {}
+
+  bool is_clear(double lag_max_s) {
+    const double end_s = std::max(chain_move_s(cell_, kRobotChain, law_.robot, from_, to_),
+                                  chain_move_s(cell_, kTableChain, law_.table, from_, to_));
+    looks_left_ = kMaxLooks;
+    return is_clear({0, end_s + lag_max_s, 0, lag_max_s});
   }
+
+ private:
+  struct Box {
+    double begin_s, end_s, lag_low_s, lag_high_s;
+  };
+
+  bool is_clear(const Box& box) {
+    if (--looks_left_ < 0) return false;
+    const double time_s = .5 * (box.begin_s + box.end_s);
+    const double lag_s = .5 * (box.lag_low_s + box.lag_high_s);
+    const Joints middle = joints_at(time_s, lag_s);
+    const double slack_m = transit_.slack_m(middle);
+    if (slack_m < limits_.refused_m) return false;
+    const Joints low = joints_at(box.begin_s, box.lag_high_s);
+    const Joints high = joints_at(box.end_s, box.lag_low_s);
+    const double arm_m = std::max(transit_.arm_travel_bound_m(low, middle), transit_.arm_travel_bound_m(middle, high));
+    const double table_m =
+        std::max(transit_.table_travel_bound_m(low, middle), transit_.table_travel_bound_m(middle, high));
+    if (arm_m + table_m <= slack_m - limits_.kept_m) return true;
+    if (box.end_s - box.begin_s >= box.lag_high_s - box.lag_low_s)
+      return is_clear({box.begin_s, time_s, box.lag_low_s, box.lag_high_s}) &&
+             is_clear({time_s, box.end_s, box.lag_low_s, box.lag_high_s});
+    return is_clear({box.begin_s, box.end_s, box.lag_low_s, lag_s}) &&
+           is_clear({box.begin_s, box.end_s, lag_s, box.lag_high_s});
+  }
+  Joints joints_at(double time_s, double lag_s) const {
+    Joints joints = to_;
+    put_chain(cell_, kRobotChain, law_.robot, from_, to_, law_.is_table_late ? time_s : time_s - lag_s, joints);
+    put_chain(cell_, kTableChain, law_.table, from_, to_, law_.is_table_late ? time_s - lag_s : time_s, joints);
+    return joints;
+  }
+
+  const Transit& transit_;
+  const CellDescription& cell_;
+  const Joints& from_;
+  const Joints& to_;
+  const Limits limits_;
+  const Law law_;
+  int looks_left_ = 0;
+};
+
+namespace {
+
+/// The laws that a chain may follow; one is enough where they are the same.
+std::vector<Interpolation> laws_of(Interpolation interpolation, Chain chain, const Joints& from, const Joints& to) {
+  int moving = 0;
+  for (std::size_t i = chain.first; i < chain.first + chain.count; ++i) moving += to[i] != from[i];
+  if (moving < 2) return {Interpolation::kIndependent};
+  if (interpolation == Interpolation::kUnknown) return {Interpolation::kIndependent, Interpolation::kCoordinated};
+  return {interpolation};
+}
+
+bool moves(Chain chain, const Joints& from, const Joints& to) {
+  return !std::equal(from.begin() + chain.first, from.begin() + chain.first + chain.count, to.begin() + chain.first);
+}
+
+}  // namespace
+
+bool Transit::is_clear(const Joints& from, const Joints& to) const {
+  const double slack_from_m = slack_m(from);
+  const Limits limits = limits_from(slack_from_m);
+  if (slack_m(to) < kMinSlackM) return false;
+  if (arm_travel_bound_m(from, to) + table_travel_bound_m(from, to) <= slack_from_m - limits.kept_m) return true;
+  // The same around the middle, from which each joint has half of its move to either side, whatever the law.
+  Joints middle;
+  for (std::size_t i = 0; i < kAxisCount; ++i) middle[i] = .5 * (from[i] + to[i]);
+  if (.5 * (arm_travel_bound_m(from, to, false) + table_travel_bound_m(from, to)) <= slack_m(middle) - limits.kept_m)
+    return true;
+  const auto& motion = reach_.cell().motion;
+  const bool has_lag = motion.start_lag_s > 0 && moves(kRobotChain, from, to) && moves(kTableChain, from, to);
+  for (const Interpolation robot : laws_of(motion.robot, kRobotChain, from, to))
+    for (const Interpolation table : laws_of(motion.table, kTableChain, from, to)) {
+      if (!Leg(*this, from, to, limits, {robot, table, false}).is_clear(has_lag ? motion.start_lag_s : 0)) return false;
+      if (has_lag && !Leg(*this, from, to, limits, {robot, table, true}).is_clear(motion.start_lag_s)) return false;
+    }
+  return true;
 }
 
 bool Transit::are_clear(const std::vector<Joints>& path) const {

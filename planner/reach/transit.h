@@ -4,9 +4,9 @@
 
 #include "planner/reach/reach.h"
 
-/// Moves that stay clear of object and table. Each axis runs its own trapezoid, all starting together, as the cell's
-/// axes do; between two checks of the clearance nothing can have moved farther than the clearance found (conservative
-/// advancement), so nothing is missed.
+/// Moves that stay clear of object and table under every way in which the cell's controllers may lead their joints: see
+/// Interpolation, and with either chain late by up to `start_lag_s`. Between two checks of the clearance nothing can
+/// have moved farther than the clearance found (conservative advancement), so nothing is missed.
 namespace hilbrush {
 
 class Transit {
@@ -15,7 +15,7 @@ class Transit {
 
   /// Whether the arm, at rest there, is far enough from everything to go anywhere.
   bool is_clear_at(const Joints& joints) const;
-  /// Whether the direct move is clear from start to end.
+  /// Whether the direct move is clear from start to end, whichever of the allowed motions the cell makes.
   bool is_clear(const Joints& from, const Joints& to) const;
 
   /// Way-points of the first path found to be clear: none (direct, unless the elbow or a winding changes); backing off
@@ -37,16 +37,20 @@ class Transit {
   Joints lifted(Joints joints) const;
   /// Way-points from a pose outwards, the last with the arm lifted; clear in the direction that they will be used in.
   std::optional<std::vector<Joints>> retreat(const Joints& pose, bool is_outwards) const;
-  double least_slack_m(const Joints& from) const;
+  /// What a move may come near to: `refused_m` where it is looked at, `kept_m` for certain between.
+  struct Limits {
+    double refused_m, kept_m;
+  };
+  Limits limits_from(double slack_m) const;
+  double slack_m(const Joints& joints) const { return reach_.clearance().slack_m(reach_.kinematics(), joints); }
+  class Leg;
   bool are_clear(const std::vector<Joints>& path) const;
   /// How far anything on the tool may travel against anything on the table, at most, while the axes move from `a` to
-  /// `b`.
-  double travel_bound_m(const Joints& a, const Joints& b) const;
+  /// `b`, none of them back: the arm's part, and the table's. Under one law the joints are ahead or behind together.
+  double arm_travel_bound_m(const Joints& a, const Joints& b, bool is_one_law = true) const;
+  double table_travel_bound_m(const Joints& a, const Joints& b) const;
 
   const Reach& reach_;
 };
-
-/// Where the axes are `time_s` into a move from rest to rest; each by its own trapezoid.
-Joints joints_during(const CellDescription& cell, const Joints& from, const Joints& to, double time_s);
 
 }  // namespace hilbrush

@@ -371,6 +371,27 @@ TEST(CellFile, MeasuredMotionIsOptional) {
   EXPECT_EQ(refusal_of(json).at, "cell.json: $.measured.settle_ms");
 }
 
+TEST(CellFile, InterpolationIsUnknownUnlessTheFileSaysIt) {
+  Json json = Json::parse(default_text());
+  CellDescription cell = cell_from_json(json.dump(), "");
+  EXPECT_EQ(cell.motion.robot, Interpolation::kUnknown);
+  EXPECT_EQ(cell.motion.table, Interpolation::kUnknown);
+  EXPECT_EQ(cell.motion.start_lag_s, .02);
+  json["interpolation"] = {{"robot", "coordinated"}, {"table", "independent"}, {"start_lag_ms", 5}};
+  cell = cell_from_json(json.dump(), "");
+  EXPECT_EQ(cell.motion.robot, Interpolation::kCoordinated);
+  EXPECT_EQ(cell.motion.table, Interpolation::kIndependent);
+  EXPECT_EQ(cell.motion.start_lag_s, .005);
+  json["interpolation"] = {{"table", "unknown"}};
+  EXPECT_EQ(cell_from_json(json.dump(), "").motion.table, Interpolation::kUnknown);
+  json["interpolation"] = {{"robot", "linear"}};
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.interpolation.robot");
+  json["interpolation"] = {{"start_lag_ms", -1}};
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.interpolation.start_lag_ms");
+  json["interpolation"] = {{"arm", "independent"}};
+  EXPECT_EQ(refusal_of(json).at, "cell.json: $.interpolation.arm");
+}
+
 TEST(CellFile, CellsAreFoundByNameOrPath) {
   EXPECT_EQ(find_cell("default"), shipped("default"));
   EXPECT_EQ(find_cell(shipped("default").string()), shipped("default"));

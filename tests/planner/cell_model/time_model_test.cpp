@@ -6,7 +6,6 @@
 #include <random>
 
 #include "planner/plan.h"
-#include "planner/reach/transit.h"
 #include "tests/planner/workpieces.h"
 
 namespace hilbrush {
@@ -59,6 +58,73 @@ TEST(TimeModel, JointsDuringAMoveKeepSpeedAndAcceleration) {
       EXPECT_LE(std::abs(c[i] - 2 * b[i] + a[i]) / (dt * dt), cell.axes[i].acceleration_max * (1 + 1e-3));
     }
   }
+}
+
+/// A straight line in joint space, as fast as the limits allow: some joint of each chain is at one of them at any time.
+TEST(TimeModel, CoordinatedJointsRunStraightAndArriveTogether) {
+  CellDescription cell = default_cell();
+  cell.axes[kJ2].time_factor = 1.5;
+  constexpr unsigned kSeed = 8;
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> share(0, 1);
+  for (int n = 0; n < 200; ++n) {
+    const Joints from = home_joints(cell);
+    Joints to = from;
+    const double scale = std::pow(10., -3 * share(random));
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      to[i] += scale * (cell.axes[i].min + share(random) * (cell.axes[i].max - cell.axes[i].min) - from[i]);
+    for (const Chain chain : {kRobotChain, kTableChain}) {
+      const double end_s = chain_move_s(cell, chain, Interpolation::kCoordinated, from, to);
+      EXPECT_GE(end_s, chain_move_s(cell, chain, Interpolation::kIndependent, from, to) * (1 - 1e-12));
+      const auto at = [&](double time_s) {
+        Joints joints = from;
+        put_chain(cell, chain, Interpolation::kCoordinated, from, to, time_s, joints);
+        return joints;
+      };
+      const double dt = 1e-4 * end_s;
+      const double factor = chain.first == kJ1 ? 1.5 : 1;
+      for (double t = dt; t < end_s - dt; t += .02 * end_s) {
+        const Joints a = at(t - dt);
+        const Joints b = at(t);
+        const Joints c = at(t + dt);
+        double used = 0;  // of what the limits allow
+        for (std::size_t i = chain.first; i < chain.first + chain.count; ++i) {
+          EXPECT_NEAR((b[i] - from[i]) * (to[chain.first] - from[chain.first]),
+                      (to[i] - from[i]) * (b[chain.first] - from[chain.first]), 1e-12);
+          const double speed = factor * std::abs(c[i] - a[i]) / (2 * dt) / cell.axes[i].speed_max;
+          const double acceleration =
+              factor * factor * std::abs(c[i] - 2 * b[i] + a[i]) / (dt * dt) / cell.axes[i].acceleration_max;
+          EXPECT_LE(speed, 1 + 1e-6) << "seed " << kSeed;
+          EXPECT_LE(acceleration, 1 + 1e-3) << "seed " << kSeed;
+          used = std::max({used, speed, acceleration});
+        }
+        EXPECT_GT(used, .49) << "seed " << kSeed << ", move " << n << " at " << t / end_s;  // .5 where it turns
+      }
+      const Joints end = at(end_s * (1 + 1e-12));
+      const Joints before = at(end_s * .999);
+      for (std::size_t i = chain.first; i < chain.first + chain.count; ++i) {
+        EXPECT_EQ(end[i], to[i]);
+        EXPECT_NE(before[i], to[i]);
+      }
+      EXPECT_EQ(at(-1), from);
+    }
+  }
+}
+
+TEST(TimeModel, MoveFollowsTheInterpolation) {
+  CellDescription cell = default_cell();
+  const Joints from = home_joints(cell);
+  Joints to = from;
+  to[kJ1] -= .5;  // slow to accelerate
+  to[kJ3] -= .2;  // slow to travel
+  const double independent_s = move_s(cell, from, to);
+  EXPECT_EQ(cell.motion.robot, Interpolation::kUnknown);
+  cell.motion.robot = Interpolation::kIndependent;
+  EXPECT_EQ(move_s(cell, from, to), independent_s);
+  cell.motion.robot = Interpolation::kCoordinated;
+  EXPECT_GE(move_s(cell, from, to), independent_s);
+  EXPECT_NEAR(move_s(cell, from, to), chain_move_s(cell, kRobotChain, Interpolation::kCoordinated, from, to),
+              cell.timing.tick_s);
 }
 
 TEST(TimeModel, SettleGrowsUpToItsCap) {

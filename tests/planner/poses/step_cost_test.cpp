@@ -13,8 +13,7 @@
 namespace hilbrush {
 namespace {
 
-TEST(StepCost, IsTheTimeModel) {
-  const CellDescription cell = default_cell();
+void expect_time_model(const CellDescription& cell) {
   const StepCost cost(cell);
   constexpr unsigned kSeed = 3;
   std::mt19937 random(kSeed);
@@ -33,6 +32,15 @@ TEST(StepCost, IsTheTimeModel) {
     EXPECT_LT(off_s, cell.timing.tick_s + 1e-5) << "seed " << kSeed << ", move " << n;
   }
   EXPECT_LT(rounded_apart, kMoves / 500);
+}
+
+TEST(StepCost, IsTheTimeModel) {
+  CellDescription cell = default_cell();
+  expect_time_model(cell);
+  cell.motion.robot = Interpolation::kCoordinated;
+  expect_time_model(cell);
+  cell.axes[kJ2].time_factor = 1.3;
+  expect_time_model(cell);
 }
 
 /// Steps on a plate at rest: with_turn() against the joints of many turns, solved.

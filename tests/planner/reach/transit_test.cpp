@@ -5,22 +5,43 @@
 #include <numbers>
 #include <random>
 
-#include "planner/cell_model/time_model.h"
 #include "planner/check/check_cell.h"
 #include "planner/poses/posed_dots.h"
 #include "tests/planner/workpieces.h"
+#include "tests/support/leg_motion.h"
 
 namespace hilbrush {
 namespace {
 
-/// Looks at every hundredth of every leg.
+using testing_support::joints_on_leg;
+using testing_support::leg_end_s;
+using testing_support::LegLaw;
+
+/// Every law that the cell's controllers may follow, with either chain late.
+std::vector<LegLaw> laws_of(const CellDescription& cell) {
+  std::vector<LegLaw> laws;
+  const auto may = [](Interpolation stated, bool is_coordinated) {
+    return stated == Interpolation::kUnknown || (stated == Interpolation::kCoordinated) == is_coordinated;
+  };
+  for (const bool robot : {false, true})
+    for (const bool table : {false, true})
+      for (const double late : {-1., -.5, 0., .5, 1.})
+        if (may(cell.motion.robot, robot) && may(cell.motion.table, table))
+          laws.push_back({robot, table, std::max(0., -late) * cell.motion.start_lag_s,
+                          std::max(0., late) * cell.motion.start_lag_s});
+  return laws;
+}
+
+/// Looks at every hundredth of every leg, under every law.
 void expect_clear(const CheckCell& check, const CellDescription& cell, const std::vector<Joints>& path,
                   const std::string& what) {
   for (std::size_t leg = 1; leg < path.size(); ++leg)
-    for (double t = 0; t <= 1; t += .01) {
-      const Joints at = joints_during(cell, path[leg - 1], path[leg], t * move_s(cell, path[leg - 1], path[leg]));
-      ASSERT_EQ(check.body_fault(at), "") << what << ", leg " << leg;
-    }
+    for (const LegLaw& law : laws_of(cell))
+      for (double t = 0; t <= 1; t += .01) {
+        const double time_s = t * leg_end_s(cell, law, path[leg - 1], path[leg]);
+        const Joints at = joints_on_leg(cell, law, path[leg - 1], path[leg], time_s);
+        ASSERT_EQ(check.body_fault(at), "") << what << ", leg " << leg;
+      }
 }
 
 /// A cell whose forearm is so low that it has to go round the object.
@@ -34,9 +55,16 @@ CellDescription low_cell() {
   return cell;
 }
 
+/// A cell that says how its controllers lead their joints, which start together.
+CellDescription coordinated_cell() {
+  CellDescription cell = default_cell();
+  cell.motion = {Interpolation::kCoordinated, Interpolation::kIndependent, 0};
+  return cell;
+}
+
 TEST(Transit, WaysBetweenRandomPosesAreClear) {
   constexpr unsigned kSeed = 51;
-  for (const CellDescription& cell : {default_cell(), low_cell()}) {
+  for (const CellDescription& cell : {default_cell(), low_cell(), coordinated_cell()}) {
     const TexturedMesh mesh = ball(.03);
     const Reach reach(mesh, cell, {});
     const Transit transit(reach);
@@ -80,6 +108,44 @@ TEST(Transit, TheSearchFindsWhatSimpleWaysMiss) {
   }
   EXPECT_GE(searched, simple);
   EXPECT_GT(searched, 5U);
+}
+
+/// What one controller may do and another may not: moves that are clear in an unknown cell are clear in every cell, and
+/// some are clear only in a cell that is known.
+TEST(Transit, AnUnknownInterpolationIsClearUnderAll) {
+  const TexturedMesh mesh = ball(.03);
+  CellDescription cell = default_cell();
+  constexpr unsigned kSeed = 61;
+  const DotSequence dots = scatter(mesh, 3e-3, kSeed);
+  std::mt19937 random(kSeed);
+  const Reach unknown(mesh, cell, {});
+  std::vector<std::pair<Joints, Joints>> moves;
+  for (int n = 0; n < 300; ++n) {
+    const auto from = unknown.find_pose(target_of(dots.dots[random() % dots.dots.size()]), home_joints(cell)).pose;
+    const auto to = unknown.find_pose(target_of(dots.dots[random() % dots.dots.size()]), home_joints(cell)).pose;
+    if (from && to) moves.emplace_back(from->joints, to->joints);
+  }
+  std::size_t clear_unknown = 0;
+  std::size_t only_known = 0;
+  for (const double lag_s : {0., .02}) {
+    cell.motion = {Interpolation::kUnknown, Interpolation::kUnknown, .02};
+    const Reach any(mesh, cell, {});
+    for (const Interpolation robot : {Interpolation::kIndependent, Interpolation::kCoordinated})
+      for (const Interpolation table : {Interpolation::kIndependent, Interpolation::kCoordinated}) {
+        cell.motion = {robot, table, lag_s};
+        const Reach known(mesh, cell, {});
+        for (const auto& [from, to] : moves) {
+          const bool is_clear = Transit(any).is_clear(from, to);
+          clear_unknown += is_clear;
+          if (is_clear)
+            EXPECT_TRUE(Transit(known).is_clear(from, to)) << "seed " << kSeed;
+          else
+            only_known += Transit(known).is_clear(from, to);
+        }
+      }
+  }
+  EXPECT_GT(clear_unknown, 0U);
+  EXPECT_GT(only_known, 0U);
 }
 
 TEST(Transit, SameWayEachTime) {
