@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "config/cell_file.h"
 #include "config/fault_script_file.h"
@@ -29,6 +30,7 @@ enum ExitCode { kOk = 0, kInternal = 1, kUsage = 2, kBadInput = 3 };
 struct Arguments {
   std::string cell = "default";
   std::string write_cell, faults, record;
+  std::optional<hilbrush::Interpolation> interpolation;
   WireOptions wire;
 };
 
@@ -51,7 +53,8 @@ void serve(Arguments arguments) {
   const auto cell_file = hilbrush::find_cell(arguments.cell);
   constexpr std::size_t kCellBytesMax = 1u << 20;
   const std::string cell_text = hilbrush::read_text_file(cell_file.string(), kCellBytesMax);
-  const auto description = hilbrush::cell_from_json(cell_text, cell_file.string());
+  auto description = hilbrush::cell_from_json(cell_text, cell_file.string());
+  if (arguments.interpolation) description.motion.robot = *arguments.interpolation;
   if (!arguments.faults.empty()) arguments.wire.faults = hilbrush::load_fault_script(arguments.faults);
 
   std::unique_ptr<hilbrush::EmissionRecordFile> record;  // outlives the cell, whose destructor may end a pulse
@@ -82,6 +85,13 @@ void add_flags(CLI::App& app, Arguments& arguments) {
   app.add_option("--cell", arguments.cell, "name of a cell, or its file")->capture_default_str();
   app.add_option("--write-cell", arguments.write_cell,
                  "write the cell file here, with its devices replaced by drivers for this simulated cell");
+  using hilbrush::Interpolation;
+  const std::map<std::string, Interpolation> interpolations{{"independent", Interpolation::kIndependent},
+                                                            {"coordinated", Interpolation::kCoordinated}};
+  app.add_option("--interpolation", arguments.interpolation,
+                 "how the robot leads its joints: independent or coordinated (default: as the cell file says; its "
+                 "table's drives are independent)")
+      ->transform(CLI::CheckedTransformer(interpolations, CLI::ignore_case));
   app.add_option("--faults", arguments.faults, "fault script (JSON)");
   app.add_option("--record", arguments.record, "append every emission to this file");
   app.add_option("--time-scale", wire.time_scale, "wall seconds for one second of the cell")

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 namespace hilbrush {
 
@@ -22,7 +24,13 @@ AxisMotion AxisMotion::brake(double start_s, double acceleration) const {
 }
 
 AxisMotion AxisMotion::move_to(double target, double start_s, double speed_max, double acceleration) const {
-  AxisMotion motion = brake(start_s, acceleration);
+  return move_to(target, start_s, start_s, speed_max, acceleration, acceleration);
+}
+
+AxisMotion AxisMotion::move_to(double target, double start_s, double go_s, double speed_max, double acceleration,
+                               double braking) const {
+  AxisMotion motion = brake(start_s, braking);
+  motion.append(go_s - motion.end_s_, 0, 0);
   const double distance = std::abs(target - motion.last_position_);
   const double direction = std::copysign(1., target - motion.last_position_);
   const double peak_speed = std::min(speed_max, std::sqrt(distance * acceleration));
@@ -33,6 +41,27 @@ AxisMotion AxisMotion::move_to(double target, double start_s, double speed_max, 
   motion.append(ramp_s, direction * peak_speed, -direction * acceleration);
   motion.last_position_ = target;  // exactly, whatever the sums rounded to
   return motion;
+}
+
+void move_coordinated(std::span<AxisMotion> motions, std::span<const double> target, std::span<const AxisLimits> limits,
+                      double start_s) {
+  // The whole move is 1 long; of it every axis allows a speed and an acceleration.
+  double speed_max = std::numeric_limits<double>::infinity();
+  double acceleration = std::numeric_limits<double>::infinity();
+  double go_s = start_s;
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const AxisMotion braking = motions[i].brake(start_s, limits[i].acceleration);
+    go_s = std::max(go_s, braking.end_s());
+    distances.push_back(std::abs(target[i] - braking.target()));
+    if (distances[i] <= 0) continue;
+    speed_max = std::min(speed_max, limits[i].speed_max / distances[i]);
+    acceleration = std::min(acceleration, limits[i].acceleration / distances[i]);
+  }
+  for (std::size_t i = 0; i < motions.size(); ++i)
+    motions[i] = distances[i] > 0 ? motions[i].move_to(target[i], start_s, go_s, distances[i] * speed_max,
+                                                       distances[i] * acceleration, limits[i].acceleration)
+                                  : motions[i].brake(start_s, limits[i].acceleration);
 }
 
 const AxisMotion::Piece* AxisMotion::piece_at(double time_s) const {

@@ -247,7 +247,7 @@ void DobotController::begin(const Item& item) {
   current_end_s_ = cell_.now_s();
   if (const auto* move = std::get_if<Move>(&item)) {
     present();
-    for (std::size_t i = 0; i < 4; ++i) cell_.move_axis(i, move->target[i], move->speed_scale);
+    cell_.move_chain(kRobotChain, move->target, move->speed_scale);
   } else if (const auto* wait = std::get_if<Wait>(&item)) {
     current_end_s_ += wait->duration_s;
     if (cell_.is_gate_open()) cell_.set_gate(true, wait->duration_s);

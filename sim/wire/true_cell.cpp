@@ -53,6 +53,33 @@ void TrueCell::move_axis(std::size_t index, double target, double speed_max, dou
                std::min(acceleration, description.acceleration_max), share);
 }
 
+void TrueCell::move_chain(Chain chain, std::span<const double> target, double speed_scale) {
+  const auto& motion = description_.motion;
+  const Interpolation interpolation = chain.first == kRobotChain.first ? motion.robot : motion.table;
+  if (interpolation != Interpolation::kCoordinated) {
+    for (std::size_t i = 0; i < chain.count; ++i) move_axis(chain.first + i, target[i], speed_scale);
+    return;
+  }
+  // The whole move is 1 long; of it every axis allows a speed and an acceleration.
+  double speed = kNever;
+  double acceleration = kNever;
+  const auto distance_of = [&](std::size_t i) {
+    const Axis& axis = axes_[chain.first + i];
+    return std::abs(target[i] - axis.motion.position(now_s_) - drift(axis));
+  };
+  for (std::size_t i = 0; i < chain.count; ++i) {
+    if (distance_of(i) == 0) continue;
+    speed = std::min(speed, limits(chain.first + i).speed_max * speed_scale / distance_of(i));
+    acceleration = std::min(acceleration, limits(chain.first + i).acceleration_max * speed_scale / distance_of(i));
+  }
+  for (std::size_t i = 0; i < chain.count; ++i) {
+    if (distance_of(i) == 0)
+      move_axis(chain.first + i, target[i], speed_scale);
+    else
+      move_axis(chain.first + i, target[i], speed * distance_of(i), acceleration * distance_of(i));
+  }
+}
+
 void TrueCell::begin_motion(std::size_t index, double target, double speed_max, double acceleration, double share) {
   Axis& axis = axes_[index];
   // Light that is on while something begins to move is a fault, whichever was ordered first.

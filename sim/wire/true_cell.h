@@ -3,6 +3,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "planner/cell_model/cell_description.h"
 #include "sim/devices/axis_motion.h"
@@ -46,6 +47,8 @@ class TrueCell {
   // Axes. `scale` of speed and acceleration: 0..1.
   void move_axis(std::size_t axis, double target, double speed_max, double acceleration);
   void move_axis(std::size_t axis, double target, double speed_scale = 1);
+  /// Moves a whole chain as the cell's interpolation says (unknown: each axis on its own).
+  void move_chain(Chain chain, std::span<const double> target, double speed_scale = 1);
   void brake_axis(std::size_t axis);
   double position(std::size_t axis) const;  ///< true
   double speed(std::size_t axis) const;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -58,6 +59,45 @@ TEST(AxisMotion, StaysContinuousAndWithinLimitsThroughMovesAndStops) {
             << "seed " << seed;
       }
       now = until;
+    }
+  }
+}
+
+/// From rest, and from the middle of another move: then all brake before they go on together.
+TEST(AxisMotion, CoordinatedAxesRunStraightWithinTheirLimits) {
+  const std::array<AxisLimits, 3> limits{{{1, 10}, {.5, 30}, {4, 8}}};
+  for (unsigned seed = 1; seed <= 50; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> place(-1, 1);
+    std::array<AxisMotion, 3> motions;
+    double now = 1;
+    for (int n = 0; n < 4; ++n) {
+      const std::array<AxisMotion, 3> before = motions;
+      std::array<double, 3> target{place(random), place(random), seed % 5 == 0 ? 0 : place(random)};
+      move_coordinated(motions, target, limits, now);
+      double end_s = now;
+      double go_s = now;  // all have braked
+      for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_NEAR(motions[i].position(now), before[i].position(now), 1e-12);
+        end_s = std::max(end_s, motions[i].end_s());
+        go_s = std::max(go_s, before[i].brake(now, limits[i].acceleration).end_s());
+      }
+      const double dt = 1e-4;
+      for (double t = now; t < end_s; t += 1e-2) {
+        const double share =
+            (motions[0].position(t) - motions[0].position(go_s)) / (target[0] - motions[0].position(go_s));
+        for (std::size_t i = 0; i < 3; ++i) {
+          EXPECT_LE(std::abs(motions[i].speed(t)), limits[i].speed_max * (1 + 1e-9)) << "seed " << seed;
+          EXPECT_LE(std::abs(motions[i].speed(t + dt) - motions[i].speed(t)), limits[i].acceleration * dt * (1 + 1e-6))
+              << "seed " << seed;
+          if (t > go_s)
+            EXPECT_NEAR(motions[i].position(t),
+                        motions[i].position(go_s) + share * (target[i] - motions[i].position(go_s)), 1e-9)
+                << "seed " << seed;
+        }
+      }
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(motions[i].position(end_s), target[i]);
+      now = n % 2 == 0 ? end_s + .1 : now + .3 * (end_s - now);
     }
   }
 }

@@ -48,6 +48,27 @@ TEST(TrueCell, AnAxisTakesTheTimeOfTheTimeModelAndSettles) {
   }
 }
 
+TEST(TrueCell, AChainMovesByTheInterpolationOfItsController) {
+  for (const Interpolation interpolation : {Interpolation::kIndependent, Interpolation::kCoordinated}) {
+    CellDescription description = test::small_cell();
+    description.motion.robot = interpolation;
+    TrueCell cell(description, {.start_delay_s = 0});
+    const Joints from = home_joints(description);
+    Joints to = from;
+    to[kJ1] += .4;
+    to[kJ2] -= .1;
+    to[kJ4] += 1;
+    cell.move_chain(kRobotChain, std::span(to).first(4));
+    const double end_s = chain_move_s(description, kRobotChain, interpolation, from, to);
+    for (double time_s = 0; time_s < 1.2 * end_s; time_s += .01 * end_s) {
+      cell.advance(time_s);
+      Joints expected = from;
+      put_chain(description, kRobotChain, interpolation, from, to, time_s, expected);
+      for (std::size_t i = 0; i < kAxisCount; ++i) EXPECT_NEAR(cell.profile(i), expected[i], 1e-9) << time_s / end_s;
+    }
+  }
+}
+
 TEST(TrueCell, BrakingStopsShortAndKeepsItsSettling) {
   Bench bench;
   bench.cell.move_axis(kRotation, 3);
