@@ -22,8 +22,8 @@ using Eigen::Vector3d;
 
 /// Samples of the tone along a contour.
 constexpr double kSamplesPerPitch = 8;
-/// The search for the pitch that gives a count of dots ends after this many trials, or at this relative error. Dots are
-/// then spread along the contours so that the count is exact.
+/// The search for the pitch that gives a count of dots ends after this many trials, or at this relative
+/// error. Dots are then spread along the contours so that the count is exact.
 constexpr int kMaxTrials = 8;
 constexpr double kCountTolerance = .002;
 /// A limit for nonsense settings: 1 m at this many slices is a pitch of 0.1 micrometers.
@@ -33,8 +33,8 @@ SurfacePoint point_on(const ContourPiece& piece, double share) {
   return {piece.triangle, (1 - share) * piece.from_b + share * piece.to_b};
 }
 
-/// Walks along a piece in short steps: visit(share of the piece before the step, share after it, asked tone times
-/// length).
+/// Walks along a piece in short steps: visit(share of the piece before the step, share after it, asked tone
+/// times length).
 template <class Visit>
 void walk_piece(const ToneField& tone, const ContourPiece& piece, double pitch_m, Visit visit) {
   if (tone.is_blank(piece.triangle)) return;
@@ -58,10 +58,11 @@ double toned_length(const Slices& slices, const ToneField& tone, double pitch_m)
   return sum;
 }
 
-/// An estimate of toned_length * pitch: the length of slices on a face is its area times the sine of its slope, over
-/// the pitch.
+/// An estimate of toned_length * pitch: the length of slices on a face is its area times the sine of its
+/// slope, over the pitch.
 double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
-  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
+  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0),
+                                             Eigen::Vector2d(0, 1)};
   double mass = 0;
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
     const Vector3d normal = mesh.area_vector(t).normalized();
@@ -70,9 +71,12 @@ double sliced_mass(const TexturedMesh& mesh, const ToneField& tone) {
   return mass;
 }
 
+/// Also of white triangles, which the field does not know to be blank.
 bool is_blank(const TexturedMesh& mesh, const ToneField& tone) {
+  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0),
+                                             Eigen::Vector2d(0, 1)};
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
-    if (!tone.is_blank(t)) return false;
+    if (!tone.is_blank(t) && tone.integrate(t, whole).mass > 0) return false;
   return true;
 }
 
@@ -81,10 +85,11 @@ bool is_blank(const TexturedMesh& mesh, const ToneField& tone) {
   if (is_blank(mesh, tone))
     throw InputError("", "the surface asks for no dots at all: it is blank, white or transparent everywhere");
   const auto [low, high] = bounds(mesh);
-  throw InputError("", fmt::format("horizontal slices (curve laminar) give no dot: the surface to be painted is level, "
-                                   "or too small for them (the object is {:.3g} mm high); choose the curve hilbert, or "
-                                   "set the object upright with --up",
-                                   1e3 * (high.z() - low.z())));
+  throw InputError(
+      "", fmt::format("horizontal slices (curve laminar) give no dot: the surface to be painted is level, "
+                      "or too small for them (the object is {:.3g} mm high); choose the curve hilbert, or "
+                      "set the object upright with --up",
+                      1e3 * (high.z() - low.z())));
 }
 
 double pitch_for(const TexturedMesh& mesh, const ToneField& tone, double mass, std::uint64_t count) {
@@ -162,8 +167,8 @@ class SliceWalk {
       const double before = std::exchange(passed_, passed_ + mass);
       for (double next = next_dot(); passed_ >= next; next = next_dot()) {
         const double share = std::clamp((next - before) / mass, 0., 1.);
-        dots_.push_back(
-            make_dot(surface_, tone_, point_on(piece, from + share * (to - from)), component_of_[piece.triangle]));
+        dots_.push_back(make_dot(surface_, tone_, point_on(piece, from + share * (to - from)),
+                                 component_of_[piece.triangle]));
       }
     });
   }
@@ -205,14 +210,16 @@ DotSequence place_laminar(const TexturedMesh& mesh, const ToneField& tone, const
   DotSequence sequence;
   const double mass = sliced_mass(mesh, tone);
   const double pitch = options.pitch_m ? *options.pitch_m : pitch_for(mesh, tone, mass, *options.dot_count);
-  check_dot_limit(options, options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch));
+  check_dot_limit(options,
+                  options.dot_count ? static_cast<double>(*options.dot_count) : mass / (pitch * pitch));
   const auto [low, high] = bounds(mesh);
   if ((high.z() - low.z()) / pitch > kMaxSlices)
     throw InputError("", "more than 10,000,000 slices: lower the dpi or the size");
   sequence.pitch_m = pitch;
   const Slices slices(mesh, pitch);
   const double length = toned_length(slices, tone, pitch);
-  const std::uint64_t count = options.dot_count.value_or(static_cast<std::uint64_t>(std::llround(length / pitch)));
+  const std::uint64_t count =
+      options.dot_count.value_or(static_cast<std::uint64_t>(std::llround(length / pitch)));
   if (count == 0) {
     if (!is_blank(mesh, tone)) throw_unmet(mesh, tone);
     return sequence;

@@ -34,7 +34,8 @@ TEST(Contours, OfASphereAreClosedCirclesInOrder) {
     EXPECT_TRUE(contours[0].is_closed);
     const auto& pieces = contours[0].pieces;
     for (std::size_t i = 0; i < pieces.size(); ++i)
-      EXPECT_EQ(pieces[i].to_O, pieces[(i + 1) % pieces.size()].from_O) << "exactly: both come from the same edge";
+      EXPECT_EQ(pieces[i].to_O, pieces[(i + 1) % pieces.size()].from_O)
+          << "exactly: both come from the same edge";
     const double z = -.025 + (static_cast<double>(k) + .5) * .001, radius = std::sqrt(.025 * .025 - z * z);
     EXPECT_NEAR(length_of(contours), 2 * kPi * radius, .01 * 2 * kPi * radius) << "slice " << k;
     for (const ContourPiece& piece : pieces) EXPECT_NEAR(piece.from_O.z(), z, 1e-12);
@@ -98,7 +99,8 @@ TEST(Laminar, UprightWallsGetASquareGrid) {
   for (std::size_t i = 1; i < dots.dots.size(); ++i) {
     EXPECT_GE(dots.dots[i].position_O.z(), dots.dots[i - 1].position_O.z() - 2e-5)
         << "upwards, but for the inset of dots";
-    EXPECT_LT((dots.dots[i].position_O - dots.dots[i - 1].position_O).norm(), 2.5 * .0005) << "no jump at " << i;
+    EXPECT_LT((dots.dots[i].position_O - dots.dots[i - 1].position_O).norm(), 2.5 * .0005)
+        << "no jump at " << i;
   }
 }
 
@@ -140,10 +142,11 @@ std::string message_of(const std::function<void()>& act) {
   return "";
 }
 
-/// A tetrahedron of 60 mm with a base of .06 nanometers, upright or lying.
+/// A tetrahedron of 60 mm, upright on a base of 60 nanometers, or lying with a base of .06 nanometers.
 TexturedMesh needle(bool is_upright) {
   TexturedMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {6e-11, 0, 0}, {0, 6e-11, 0}, {0, 0, .06}};
+  const double base = is_upright ? 6e-8 : 6e-11;
+  mesh.vertices = {{0, 0, 0}, {base, 0, 0}, {0, base, 0}, {0, 0, .06}};
   mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   if (!is_upright)
     for (auto& p : mesh.vertices) p = {p.z(), p.x(), p.y()};
@@ -157,7 +160,8 @@ TEST(Laminar, SlenderObjectsGetTheirCountOrAMessage) {
     for (const SampleOptions& options : {with_count(500), with_pitch(.000254)}) {
       std::size_t count = 0;
       const std::string message = message_of([&] { count = place_laminar(mesh, tone, options).dots.size(); });
-      EXPECT_TRUE(message.empty() ? count == options.dot_count : message.find("too small") != std::string::npos)
+      EXPECT_TRUE(message.empty() ? count == options.dot_count
+                                  : message.find("too small") != std::string::npos)
           << count << " dots, " << message;
     }
   }
@@ -173,7 +177,8 @@ TEST(Laminar, HorizontalFacesGetNothing) {
   }
   const TexturedMesh cube = test::cube();
   const ToneField cube_tone(cube, {});
-  for (const Dot& dot : place_laminar(cube, cube_tone, with_count(999)).dots) EXPECT_NEAR(dot.normal_O.z(), 0, 1e-6);
+  for (const Dot& dot : place_laminar(cube, cube_tone, with_count(999)).dots)
+    EXPECT_NEAR(dot.normal_O.z(), 0, 1e-6);
 }
 
 TEST(Laminar, HostileMeshesGetTheirCountOnTheSurface) {
@@ -185,7 +190,8 @@ TEST(Laminar, HostileMeshesGetTheirCountOnTheSurface) {
     ASSERT_EQ(dots.dots.size(), 500u) << name;
     for (const Dot& dot : dots.dots) {
       const Eigen::Vector3d& corner = mesh.corner(dot.triangle, 0);
-      EXPECT_NEAR((dot.position_O - corner).dot(mesh.area_vector(dot.triangle).normalized()), 0, 1e-9) << name;
+      EXPECT_NEAR((dot.position_O - corner).dot(mesh.area_vector(dot.triangle).normalized()), 0, 1e-9)
+          << name;
       EXPECT_EQ(dot.level, 1);
     }
   }
