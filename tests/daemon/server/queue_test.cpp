@@ -30,7 +30,8 @@ Json job_of(LineClient& client, const std::string& id) {
 }
 
 std::string queued(LineClient& client, const fs::path& model) {
-  const Json answer = client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}});
+  const Json answer =
+      client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}});
   return answer.at("job").at("id").get<std::string>();
 }
 
@@ -80,7 +81,8 @@ TEST(ServerQueueTest, TheOrderCanBeChangedAndSurvivesARestart) {
       << "a cancelled job has no place";
   // Planned in that order: b is not touched before c is ready.
   for (std::string state; state != "ready"; state = job_of(client, c).at("state").get<std::string>())
-    EXPECT_TRUE(state.empty() || job_of(client, a).at("state") == "queued" || job_of(client, c).at("state") == "ready");
+    EXPECT_TRUE(state.empty() || job_of(client, a).at("state") == "queued" ||
+                job_of(client, c).at("state") == "ready");
   for (const auto& id : {b, a}) world.wait_for(client, id, "ready");
   EXPECT_EQ(queue_of(client), (std::vector{c, b, a}));
 }
@@ -103,8 +105,8 @@ TEST(ServerQueueTest, AThousandJobsAreListedInBatchesAndMovedWhileAStopIsAnswere
   LineClient greedy = world.client();
   std::string batch;
   for (int i = 0; i < 64; ++i)
-    batch +=
-        (i > 0 ? "," : "[") + std::string(R"({"jsonrpc":"2.0","id":1,"method":"job.list","params":{"limit":1000}})");
+    batch += (i > 0 ? "," : "[") +
+             std::string(R"({"jsonrpc":"2.0","id":1,"method":"job.list","params":{"limit":1000}})");
   greedy.send_bytes(batch + "]\n");
   std::chrono::steady_clock::duration worst{};
   for (int i = 0; i < 20; ++i) {
@@ -121,9 +123,9 @@ TEST(ServerQueueTest, AThousandJobsAreListedInBatchesAndMovedWhileAStopIsAnswere
   EXPECT_EQ(client.result("job.move", {{"id", "1000"}, {"position", 1}}).at("job").at("position"), 1);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
   EXPECT_EQ(job_of(client, "1").at("position"), 2);
-  EXPECT_EQ(
-      client.error_code("job.submit", {{"model", world.model("a.wrl").string()}, {"settings", {{"size_mm", 80}}}}),
-      kRpcWrongState)
+  EXPECT_EQ(client.error_code("job.submit",
+                              {{"model", world.model("a.wrl").string()}, {"settings", {{"size_mm", 80}}}}),
+            kRpcWrongState)
       << "the queue is bounded";
   world.end();
   JobStore store(world.options.state / "jobs.sqlite");
@@ -149,7 +151,8 @@ TEST(ServerQueueTest, CopiesArePaintedOneAfterAnotherEachOnItsOwnPart) {
     connected->result("job.start", placed(id));
     const Json job = world.wait_for(*connected, id, copy == 3 ? "done" : "ready");
     EXPECT_EQ(job.at("copies_done"), copy);
-    EXPECT_EQ(job.at("dots").at("exposed"), copy == 3 ? 120 : 0) << "the counts are those of the present part";
+    EXPECT_EQ(job.at("dots").at("exposed"), copy == 3 ? 120 : 0)
+        << "the counts are those of the present part";
     EXPECT_EQ(connected->result("cell.status").at("cell").at("state"), "idle") << "armed again for each part";
     if (copy == 2) {
       world.end();
@@ -167,7 +170,8 @@ TEST(ServerQueueTest, CopiesArePaintedOneAfterAnotherEachOnItsOwnPart) {
   EXPECT_EQ(connected->error_code("job.submit", other), kRpcBadParams) << "the same key, another order";
   other["copies"] = 0;
   EXPECT_EQ(connected->error_code("job.submit", other), kRpcBadParams);
-  other = {{"model", order.at("model")}, {"settings", order.at("settings")}, {"copies", 2}, {"dry_run", true}};
+  other = {
+      {"model", order.at("model")}, {"settings", order.at("settings")}, {"copies", 2}, {"dry_run", true}};
   EXPECT_EQ(connected->error_code("job.submit", other), kRpcBadParams);
 }
 
@@ -190,7 +194,8 @@ TEST(ServerQueueTest, AMissingJournalIsNeverMadeAnew) {
   do job = job_of(client, id);
   while (job.at("error").is_null() && std::chrono::steady_clock::now() < deadline);
   EXPECT_EQ(job.at("state"), "paused");
-  EXPECT_NE(job.at("error").at("message").get<std::string>().find("the journal is missing"), std::string::npos);
+  EXPECT_NE(job.at("error").at("message").get<std::string>().find("the journal is missing"),
+            std::string::npos);
   EXPECT_EQ(read_emission_record(world.job_folder(id) / "emissions.ply").size(), before);
 }
 
@@ -208,13 +213,15 @@ TEST(ServerQueueTest, TheJournalIsBelievedWhereTheStoreIsBehind) {
     while (job_of(client, id).at("dots").at("exposed").get<int>() < 60) std::this_thread::yield();
   }
   world.end();
-  execute_sql(world.options.state / "jobs.sqlite", "UPDATE job SET state = 'ready', is_begun = 0, exposed = 0");
+  execute_sql(world.options.state / "jobs.sqlite",
+              "UPDATE job SET state = 'ready', is_begun = 0, exposed = 0");
   world.begin();
   LineClient client = world.client();
   const Json job = world.wait_for(client, id, "paused");
   EXPECT_TRUE(job.at("needs_part_in_place").get<bool>());
   const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
-  while (job_of(client, id).at("dots").at("exposed").get<int>() < 60 && std::chrono::steady_clock::now() < deadline)
+  while (job_of(client, id).at("dots").at("exposed").get<int>() < 60 &&
+         std::chrono::steady_clock::now() < deadline)
     std::this_thread::yield();
   EXPECT_EQ(client.error_code("job.start", placed(id)), kRpcWrongState);
   world.clear_and_arm(client);
@@ -261,10 +268,12 @@ TEST(ServerQueueTest, ALostStoreIsMadeAgainFromTheJobsFolders) {
       std::ofstream(world.options.state / "jobs.sqlite") << std::string(10000, 'x');
     else
       fs::remove(world.options.state / "jobs.sqlite");
-    for (const char* suffix : {"-wal", "-shm"}) fs::remove(world.options.state / ("jobs.sqlite" + std::string(suffix)));
+    for (const char* suffix : {"-wal", "-shm"})
+      fs::remove(world.options.state / ("jobs.sqlite" + std::string(suffix)));
     fs::remove(world.job_folder(nameless) / "job.json");
     world.begin();
-    EXPECT_NE(world.daemon().notice().find("2 jobs were found again"), std::string::npos) << world.daemon().notice();
+    EXPECT_NE(world.daemon().notice().find("2 jobs were found again"), std::string::npos)
+        << world.daemon().notice();
     LineClient client = world.client();
     EXPECT_EQ(job_of(client, done).at("state"), "done");
     EXPECT_EQ(job_of(client, nameless).at("state"), "failed") << "its files keep its number";
@@ -338,7 +347,8 @@ TEST(JobStoreTest, AStoreOfANewerDaemonIsRefusedAndLeftAsItIs) {
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("newer"), std::string::npos) << error.what();
   }
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1) << "not set aside";
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1)
+      << "not set aside";
 }
 
 /// A change that could not be written is written later, although others could be written meanwhile.
@@ -351,8 +361,8 @@ TEST(JobStoreTest, WhatCouldNotBeStoredIsStoredLater) {
   const fs::path record = folder / "jobs" / std::to_string(a);
   fs::remove_all(record);
   std::ofstream(record) << "no folder";
-  execute_sql(folder / "jobs.sqlite", "CREATE TRIGGER full BEFORE UPDATE ON job WHEN NEW.id = " + std::to_string(a) +
-                                          " BEGIN SELECT RAISE(ABORT, 'full'); END;");
+  execute_sql(folder / "jobs.sqlite", "CREATE TRIGGER full BEFORE UPDATE ON job WHEN NEW.id = " +
+                                          std::to_string(a) + " BEGIN SELECT RAISE(ABORT, 'full'); END;");
   queue.find(a)->state = JobState::kCancelled;
   queue.changed(*queue.find(a));
   queue.changed(*queue.find(b));
@@ -399,12 +409,15 @@ TEST(ServerQueueTest, AJobOfAnotherCellIsRefusedAndKept) {
   {
     LineClient client = world.client();
     world.clear_and_arm(client);
-    for (const auto& [id, act, kept] : {std::tuple(paused, "job.resume", "paused"), {ready, "job.start", "ready"}}) {
+    for (const auto& [id, act, kept] :
+         {std::tuple(paused, "job.resume", "paused"), {ready, "job.start", "ready"}}) {
       client.result(act, placed(id));
       const Json job = world.wait_for(client, id, kept);
-      EXPECT_NE(job.at("error").at("message").get<std::string>().find("another cell"), std::string::npos) << job;
+      EXPECT_NE(job.at("error").at("message").get<std::string>().find("another cell"), std::string::npos)
+          << job;
     }
-    EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "idle") << "not stopped: the cell is sound";
+    EXPECT_EQ(client.result("cell.status").at("cell").at("state"), "idle")
+        << "not stopped: the cell is sound";
   }
   world.end();
   world.options.cell = cell;
@@ -438,7 +451,8 @@ TEST(JobStoreTest, KeepsTheHistoryButLoadsOnlyItsEnd) {
   EXPECT_EQ(store.find(1)->measured, R"({"move_delay_ms":1.5})");
 }
 
-/// After a start the journals of all jobs are read, the newest first; meanwhile a job may end and push the oldest out.
+/// After a start the journals of all jobs are read, the newest first; meanwhile a job may end and push the
+/// oldest out.
 TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobody) {
   DaemonWorld world;
   {
@@ -471,142 +485,8 @@ TEST(ServerQueueTest, AJobThatLeavesTheHistoryBeforeItsJournalIsReadDisturbsNobo
     next = page.at("next");
   }
   EXPECT_EQ(count, 1000u) << "the pages are the whole list";
-  EXPECT_EQ(client.result("job.get", {{"id", "1"}}).at("job").at("state"), "done") << "older ones are looked up";
-}
-
-TEST(JobRecordTest, SaysAllOfAJobAndReadsWhateverItIsGiven) {
-  Job job;
-  job.id = 12;
-  job.key = "k\"\xff";
-  job.state = JobState::kPaused;
-  job.model = "/a b.wrl";
-  job.copies = 3;
-  job.copies_done = 1;
-  job.is_begun = true;
-  job.error = JobError{"x:1", "no"};
-  job.warnings = {"one", "two"};
-  job.measured = R"({"move_delay_ms":1.5})";
-  job.plan = R"({"suggestion":"none"})";
-  const auto back = job_from_record(job_to_record(job));
-  ASSERT_TRUE(back);
-  EXPECT_EQ(back->id, 12);
-  EXPECT_EQ(back->state, JobState::kPaused);
-  EXPECT_EQ(back->copies_done, 1);
-  EXPECT_TRUE(back->is_begun);
-  EXPECT_EQ(back->error->message, "no");
-  EXPECT_EQ(back->warnings, job.warnings);
-  EXPECT_EQ(back->measured, job.measured);
-  EXPECT_EQ(back->plan, job.plan);
-  for (const char* text : {"", "[]", "{", "{}", R"({"id":-1,"state":"done"})", R"({"id":1,"state":"asleep"})"})
-    EXPECT_FALSE(job_from_record(text)) << text;
-  const auto odd = job_from_record(R"({"id":1,"state":"done","copies":"many","warnings":7,"error_message":[]})");
-  ASSERT_TRUE(odd);
-  EXPECT_EQ(odd->copies, 1);
-}
-
-TEST(JobRecordTest, ThePlanIsBoundedWhateverTheReportHolds) {
-  for (const Json& odd : {Json(nullptr), Json("text"), Json::array({1}), Json::parse(R"({"mesh":7,"skipped":{"a":1}})"),
-                          Json::parse(R"({"mesh":{"size_mm":[1,"x",3]},"skipped":[5,null,{"count":"n"}]})")}) {
-    const Json plan = plan_of_report(odd);
-    EXPECT_TRUE(plan.at("size_mm").is_null());
-    EXPECT_TRUE(plan.at("skipped").empty());
-    EXPECT_TRUE(plan.at("suggestion").is_null());
-  }
-  Json large;
-  for (int i = 0; i < 1000; ++i) large["skipped"].push_back({{"count", i}, {"text", std::string(100000, 'x')}});
-  large["suggestion"] = {{"text", std::string(100000, 'x')}};
-  EXPECT_LT(plan_of_report(large).dump().size(), 4000u);
-}
-
-/// The daemon on devices of the test's own.
-class ServerDevicesTest : public ::testing::Test {
- protected:
-  void begin(double time_scale = 0) {
-    world.options.time_scale = time_scale;
-    world.options.make_devices = [this](const CellDescription& description) {
-      auto made = std::make_unique<test::SimDevices>(description);
-      devices = made.get();
-      return made;
-    };
-    world.begin();
-    client.emplace(world.options.socket);
-  }
-  Json wait_for_state(const std::string& state) {
-    const auto deadline = std::chrono::steady_clock::now() + LineClient::kPatience;
-    for (;;) {
-      const Json cell = client->result("cell.status").at("cell");
-      if (cell.at("state") == state) return cell;
-      if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error("the cell is " + cell.dump());
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
-  }
-  test::SimDevices* devices = nullptr;
-  DaemonWorld world;
-  std::optional<LineClient> client;
-};
-
-TEST_F(ServerDevicesTest, AnInterlockOpenedWhileArmedIsAStopThatLatches) {
-  begin();
-  client->result("cell.clear");
-  devices->sim.set_interlock_closed(false);
-  std::this_thread::sleep_for(std::chrono::milliseconds(150));
-  EXPECT_EQ(client->result("cell.status").at("cell").at("state"), "idle") << "a part may be changed at rest";
-  devices->sim.set_interlock_closed(true);
-  client->result("cell.arm");
-  devices->sim.set_interlock_closed(false);
-  const Json cell = wait_for_state("stopped");
-  EXPECT_NE(cell.at("reason").get<std::string>().find("interlock"), std::string::npos);
-  devices->sim.set_interlock_closed(true);
-  std::this_thread::sleep_for(std::chrono::milliseconds(150));
-  EXPECT_EQ(client->result("cell.status").at("cell").at("state"), "stopped");
-  EXPECT_EQ(client->error_code("cell.arm"), kRpcWrongState);
-  world.clear_and_arm(*client);
-}
-
-TEST_F(ServerDevicesTest, ADeviceThatFailsAtRestStopsTheCellAndIsBroughtBackByClear) {
-  begin();
-  client->result("cell.clear");
-  devices->sim.fail_robot("the link was lost");
-  const Json cell = wait_for_state("stopped");
-  EXPECT_NE(cell.at("reason").get<std::string>().find("the link was lost"), std::string::npos);
-  std::ifstream in(world.options.state / "audit.log");
-  const std::string log((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  EXPECT_NE(log.find("\"user\":\"hilbrushd\""), std::string::npos) << "a stop of its own is recorded, too";
-  world.clear_and_arm(*client);
-  EXPECT_EQ(client->result("cell.status").at("cell").at("devices").at("robot").at("state"), "ready");
-}
-
-TEST_F(ServerDevicesTest, ADeviceThatFailsInAJobPausesItAndTheJobGoesOn) {
-  begin(.02);
-  const auto id = world.submit(*client, world.model("cup.wrl", 600), "ready");
-  world.clear_and_arm(*client);
-  client->result("job.start", placed(id));
-  for (int round = 0; round < 3; ++round) {
-    const int before = job_of(*client, id).at("dots").at("exposed").get<int>();
-    while (job_of(*client, id).at("dots").at("exposed").get<int>() < before + 30) std::this_thread::yield();
-    if (round == 0) devices->sim.fail_table("overload");
-    if (round == 1) devices->sim.set_interlock_closed(false);
-    if (round == 2) devices->sim.fail_robot("collision");
-    const Json job = world.wait_for(*client, id, "paused");
-    EXPECT_FALSE(job.at("error").is_null());
-    EXPECT_TRUE(job.at("needs_part_in_place").get<bool>());
-    EXPECT_LE(job.at("dots").at("in_doubt").get<int>(), round + 1);
-    devices->sim.set_interlock_closed(true);
-    world.clear_and_arm(*client);
-    EXPECT_EQ(client->error_code("job.resume", {{"id", id}}), kRpcWrongState);
-    client->result("job.resume", placed(id));
-  }
-  const Json job = world.wait_for(*client, id, "done");
-  EXPECT_EQ(job.at("dots").at("exposed").get<int>() + job.at("dots").at("in_doubt").get<int>(), 600);
-  ASSERT_TRUE(job.at("timing").is_object());
-  EXPECT_GT(job.at("timing").at("own_ms").at("p99").get<double>(), 0);
-  const Json& measured = job.at("timing").at("measured");
-  EXPECT_GE(measured.at("move_delay_ms").get<double>(), 0);
-  EXPECT_EQ(measured.size(), 2u) << "as it may stand in a cell file";
-  EXPECT_TRUE(job.at("timing").at("measured_is_enough").is_boolean());
-  EXPECT_EQ(job.at("timing").at("measured_moves").size(), measured.at("time_factor").size());
-  for (const auto& emission : read_emission_record(world.job_folder(id) / "emissions.ply"))
-    EXPECT_FALSE(emission.is_moving);
+  EXPECT_EQ(client.result("job.get", {{"id", "1"}}).at("job").at("state"), "done")
+      << "older ones are looked up";
 }
 
 }  // namespace
