@@ -16,11 +16,30 @@ constexpr double kBytesPerDot = 512;
 constexpr std::uint64_t kMaxDots = std::numeric_limits<std::uint32_t>::max();
 
 /// The pitch before the dots are placed. For a job that gives the number of dots it is estimated as if the tone were
-/// one half everywhere. It only chooses the tone curve, on cells whose spot is given in millimeters.
+/// one half everywhere. It chooses the tone curve, on cells whose spot is given in millimeters.
 double expected_pitch_m(const JobSettings& settings, const TexturedMesh& mesh) {
   const SampleOptions options = sample_options(settings);
   if (options.pitch_m) return *options.pitch_m;
   return std::sqrt(.5 * mesh.area_m2() / static_cast<double>(*options.dot_count));
+}
+
+/// The pitch that this number of dots has, within a few hundredths: what is asked for below a pitch depends on it, a
+/// little, and it on what is asked for.
+double pitch_of_count(const TexturedMesh& mesh, ToneOptions options, const std::vector<double>& levels,
+                      std::uint64_t count, double first_guess_m) {
+  constexpr int kMaxTrials = 3;
+  constexpr double kCloseEnough = .02;
+  if (levels != std::vector<double>{1}) options.curve = density_curve(options.curve, levels);
+  options.pitch_m = first_guess_m;
+  for (int trial = 0; trial < kMaxTrials; ++trial) {
+    const double mass_m2 = asked_mass_m2(ToneField(mesh, options));
+    if (!(mass_m2 > 0)) break;
+    const double pitch_m = std::sqrt(mass_m2 / static_cast<double>(count));
+    const bool is_close = std::abs(pitch_m / options.pitch_m - 1) < kCloseEnough;
+    options.pitch_m = pitch_m;
+    if (is_close) break;
+  }
+  return options.pitch_m;
 }
 
 }  // namespace
@@ -40,6 +59,10 @@ CellTone job_tone(const CellDescription& cell, const JobSettings& settings, cons
     tone.options.curve = {{0, 1}, {0, cell.paint.asked_max}};
     tone.warning.clear();
   }
+  tone.options.pitch_m = pitch_m;
+  if (settings.dots)
+    tone.options.pitch_m = pitch_of_count(mesh, tone.options, energy_levels(settings.levels, cell.paint.asked_max),
+                                          *settings.dots, pitch_m);
   return tone;
 }
 

@@ -41,6 +41,8 @@ struct ToneOptions {
   double reflectance_black = 0;  ///< ... and of fully exposed paint (Murray-Davies)
   Untextured untextured = Untextured::kAuto;
   ToneCurve curve;
+  /// Of the dots: the curve holds for the mean coverage over about a pitch (tone/pitch_mean.h). 0: for every texel.
+  double pitch_m = 0;
 };
 
 }  // namespace hilbrush

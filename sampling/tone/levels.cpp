@@ -3,7 +3,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "sampling/base/check.h"
@@ -31,14 +30,6 @@ double nearest_level(std::span<const double> levels, double energy) {
                            [&](double a, double b) { return std::abs(a - energy) < std::abs(b - energy); });
 }
 
-/// All that is asked for, in dots of energy 1.
-double asked_energy(const ToneField& asked, double pitch_m) {
-  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
-  double mass = 0;
-  for (std::uint32_t t = 0; t < asked.mesh().triangle_count(); ++t) mass += asked.integrate(t, whole).mass;
-  return mass / (pitch_m * pitch_m);
-}
-
 /// Where the tone changes within the box of a dot, its energy is an estimate. What the estimates miss of the total, a
 /// few thousandths, is shared among these dots; those in flat tone have one level exactly and keep it.
 void share_missing_energy(DotSequence& dots, const ToneField& asked, std::span<const double> levels) {
@@ -51,7 +42,8 @@ void share_missing_energy(DotSequence& dots, const ToneField& asked, std::span<c
     if (std::abs(energy - nearest_level(levels, energy)) > kFlat * energy) estimated.push_back(i);
   }
   if (estimated.empty()) return;
-  const double each = (asked_energy(asked, dots.pitch_m) - total) / static_cast<double>(estimated.size());
+  const double each =
+      (asked_mass_m2(asked) / (dots.pitch_m * dots.pitch_m) - total) / static_cast<double>(estimated.size());
   for (const std::size_t i : estimated) dots.dots[i].level += static_cast<float>(each);
 }
 

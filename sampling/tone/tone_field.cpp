@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "sampling/base/check.h"
 #include "sampling/base/cross.h"
@@ -22,6 +24,11 @@ constexpr double kMinTexels = 1e-3;
 /// Of all layers together, about; and the finest that a texel is cut, along a side.
 constexpr double kRefinedTexels = 12e6;
 constexpr int kMaxRefinement = 15;
+/// With means over a pitch: so many texels for one of the textures', and steps between sizes of a pitch, in octaves.
+constexpr double kAveragedTexels = 2;
+constexpr double kFinestOctaves = .5, kCoarsestOctaves = 16;
+/// What a straight curve may deviate by, as a share of its end.
+constexpr double kStraight = 1e-6;
 
 /// Opens a triangle that is a line or a point in its texture, by a thousandth of a texel.
 void open_collapsed(std::array<Vector2d, 3>& p) {
@@ -55,7 +62,7 @@ bool is_painted_by_untextured_rule(const Material& material, Untextured rule, bo
 }  // namespace
 
 ToneField::ToneField(const TexturedMesh& mesh, const ToneOptions& options) : mesh_(mesh), options_(options) {
-  choose_sources();
+  make_layers(choose_sources());
 }
 
 ToneField::ToneField(const ToneField& base, AskedAtlas atlas)
@@ -63,34 +70,109 @@ ToneField::ToneField(const ToneField& base, AskedAtlas atlas)
   CHECK(&atlas_->layout.mesh() == &mesh_);
 }
 
-void ToneField::choose_sources() {
+std::vector<ToneField::Look> ToneField::choose_sources() {
   bool any_colored = false;
   for (const auto m : mesh_.material_index)
     any_colored |=
         mesh_.materials[m].source == ColorSource::kColors || mesh_.materials[m].source == ColorSource::kTexture;
   sources_.resize(mesh_.triangle_count());
+  std::vector<Look> looks;
   for (std::uint32_t t = 0; t < mesh_.triangle_count(); ++t) {
     const Material& material = mesh_.materials[mesh_.material_index[t]];
     if (material.opacity <= 0 || !is_painted_by_untextured_rule(material, options_.untextured, any_colored)) continue;
     const bool has_texture = material.source == ColorSource::kTexture && material.texture >= 0;
-    sources_[t] = has_texture ? textured_source(t, material) : Source{Source::kColors, 0};
+    sources_[t] = has_texture ? textured_source(t, material, looks) : Source{Source::kColors, 0};
   }
+  return looks;
 }
 
-ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& material) {
+/// Its layer is the index of its look, until there are layers.
+ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& material, std::vector<Look>& looks) {
   float factor = -1;
   if (mesh_.textures[static_cast<std::size_t>(material.texture)].channels <= 2) {
     const auto& l = mesh_.corner_luminance[t];
     factor = l[0] == l[1] && l[1] == l[2] ? l[0] : (l[0] + l[1] + l[2]) / 3;
   }
-  const Source source{Source::kTexture, find_layer(material, factor)};
-  sources_[t] = source;
+  const Look look{material.texture, factor, material.opacity, {material.repeat_u, material.repeat_v}};
+  const auto found = std::find(looks.begin(), looks.end(), look);
+  const auto index = static_cast<std::uint32_t>(found - looks.begin());
+  if (found == looks.end()) looks.push_back(look);
   const auto p = texel_corners(t);
   for (int k = 0; k < 3; ++k)
     if (!((p[static_cast<std::size_t>((k + 1) % 3)] - p[static_cast<std::size_t>(k)]).lpNorm<Eigen::Infinity>() <=
           kMaxTexels))
-      return {Source::kMean, source.layer};
-  return source;
+      return {Source::kMean, index};
+  return {Source::kTexture, index};
+}
+
+/// A straight curve asks for the same, wherever it is applied.
+bool ToneField::is_averaged() const {
+  const ToneCurve& curve = options_.curve;
+  if (!(options_.pitch_m > 0) || curve.wanted.empty()) return false;
+  for (std::size_t k = 0; k < curve.wanted.size(); ++k)
+    if (std::abs(curve.asked[k] - curve.wanted[k] * curve.asked.back()) > kStraight * curve.asked.back()) return true;
+  return false;
+}
+
+Vector2d ToneField::texels_per_pitch_on(std::uint32_t triangle) const {
+  const auto p = texel_corners(triangle);
+  const Eigen::Vector3d a = mesh_.corner(triangle, 1) - mesh_.corner(triangle, 0),
+                        b = mesh_.corner(triangle, 2) - mesh_.corner(triangle, 0);
+  const double length = a.norm();
+  return texels_per_pitch({p[1] - p[0], p[2] - p[0]},
+                          {Vector2d(length, 0), Vector2d(a.dot(b) / length, a.cross(b).norm() / length)},
+                          options_.pitch_m);
+}
+
+void ToneField::make_layers(const std::vector<Look>& looks) {
+  if (!is_averaged()) {
+    for (const Look& look : looks) layers_.push_back(make_layer(look));
+    return;
+  }
+  double most_texels = kRefinedTexels;
+  for (const Look& look : looks) {
+    const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
+    most_texels += kAveragedTexels * texture.width * texture.height;
+  }
+  std::vector<Vector2d> pitches(mesh_.triangle_count());
+  const auto is_textured = [&](std::size_t t) {
+    return sources_[t].kind == Source::kTexture || sources_[t].kind == Source::kMean;
+  };
+  tbb::parallel_for(std::size_t{0}, pitches.size(), [&](std::size_t t) {
+    if (is_textured(t)) pitches[t] = texels_per_pitch_on(static_cast<std::uint32_t>(t));
+  });
+  const auto layer_of = [&](std::size_t t, double octaves) {
+    const Texture& texture = mesh_.textures[static_cast<std::size_t>(looks[sources_[t].layer].texture)];
+    return std::pair(sources_[t].layer, round_to_steps(pitches[t], octaves, texture.width, texture.height).steps);
+  };
+  const auto grid_of = [&](const Look& look, const std::array<int, 2>& steps, double octaves) {
+    const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
+    return asked_grid(texture.width, texture.height, {steps}, octaves, refinement_of(texture));
+  };
+  // Pitches of differing sizes share a layer where memory is short.
+  std::map<std::pair<std::uint32_t, std::array<int, 2>>, std::uint32_t> layers;
+  double octaves = kFinestOctaves;
+  for (;; octaves *= 2) {
+    layers.clear();
+    double texels = 0;
+    for (std::size_t t = 0; t < sources_.size(); ++t) {
+      if (!is_textured(t)) continue;
+      const auto layer = layer_of(t, octaves);
+      if (layers.emplace(layer, 0).second) texels += grid_of(looks[layer.first], layer.second, octaves).texels();
+    }
+    if (texels <= most_texels || octaves >= kCoarsestOctaves) break;
+  }
+  std::uint32_t made_for = 0;
+  std::vector<float> wanted;
+  for (auto& [layer, index] : layers) {
+    const Look& look = looks[layer.first];
+    if (wanted.empty() || made_for != layer.first) wanted = wanted_texels(look);
+    made_for = layer.first;
+    index = static_cast<std::uint32_t>(layers_.size());
+    layers_.push_back(make_layer(look, wanted, grid_of(look, layer.second, octaves)));
+  }
+  for (std::size_t t = 0; t < sources_.size(); ++t)
+    if (is_textured(t)) sources_[t].layer = layers.at(layer_of(t, octaves));
 }
 
 /// The curve bends between texels too: black beside white asks for much less in the middle than the mean of both. So
@@ -105,17 +187,12 @@ int ToneField::refinement_of(const Texture& texture) const {
   return refinement;
 }
 
-std::uint32_t ToneField::find_layer(const Material& material, float luminance_factor) {
-  const TexelAddressing addressing{material.repeat_u, material.repeat_v};
-  for (std::uint32_t i = 0; i < layers_.size(); ++i)
-    if (layers_[i].texture == material.texture && layers_[i].luminance_factor == luminance_factor &&
-        layers_[i].opacity == material.opacity && layers_[i].addressing == addressing)
-      return i;
-  const Texture& texture = mesh_.textures[static_cast<std::size_t>(material.texture)];
+ToneField::Layer ToneField::make_layer(const Look& look) const {
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
   const int refinement = refinement_of(texture);
   const int width = texture.width * refinement, height = texture.height * refinement;
   std::vector<float> tones(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  const double factor = luminance_factor < 0 ? 1 : luminance_factor;
+  const double factor = look.luminance_factor < 0 ? 1 : look.luminance_factor;
   const auto wanted_of_texel = [&](std::size_t i) {
     return coverage(factor * texture.luminance[i]) * (texture.opacity.empty() ? 1 : texture.opacity[i]);
   };
@@ -123,13 +200,31 @@ std::uint32_t ToneField::find_layer(const Material& material, float luminance_fa
     float* out = tones.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
     for (int column = 0; column < width; ++column) {
       const Vector2d texel((column + .5) / refinement - .5, (row + .5) / refinement - .5);
-      const double wanted = look_up(texture.width, texture.height, texel, addressing, wanted_of_texel);
-      out[column] = static_cast<float>(asked_for(wanted * material.opacity));
+      const double wanted = look_up(texture.width, texture.height, texel, look.addressing, wanted_of_texel);
+      out[column] = static_cast<float>(asked_for(wanted * look.opacity));
     }
   });
-  layers_.push_back({material.texture, luminance_factor, material.opacity, addressing, refinement,
-                     ToneLayer(width, height, std::move(tones))});
-  return static_cast<std::uint32_t>(layers_.size() - 1);
+  return {look.luminance_factor, Vector2d::Constant(refinement), ToneLayer(width, height, std::move(tones))};
+}
+
+std::vector<float> ToneField::wanted_texels(const Look& look) const {
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
+  const double factor = look.luminance_factor < 0 ? 1 : look.luminance_factor;
+  std::vector<float> wanted(texture.luminance.size());
+  tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
+    wanted[i] = static_cast<float>(coverage(factor * texture.luminance[i]) *
+                                   (texture.opacity.empty() ? 1 : texture.opacity[i]) * look.opacity);
+  });
+  return wanted;
+}
+
+ToneField::Layer ToneField::make_layer(const Look& look, const std::vector<float>& wanted,
+                                       const AskedGrid& grid) const {
+  const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
+  return {
+      look.luminance_factor,
+      Vector2d(static_cast<double>(grid.size[0]) / texture.width, static_cast<double>(grid.size[1]) / texture.height),
+      asked_over_pitch(wanted, texture.width, texture.height, look.addressing, grid, options_.curve)};
 }
 
 double ToneField::coverage(double luminance) const {
@@ -196,8 +291,8 @@ ToneField::AskedTexels ToneField::asked_texels(std::uint32_t triangle) const {
   if (atlas_) return {atlas_->tones, {false, false}, atlas_->layout.texel_corners(triangle)};
   const Layer& layer = layers_[sources_[triangle].layer];
   auto corners = texel_corners(triangle);
-  for (Vector2d& corner : corners) corner = layer.refined(corner);
-  return {layer.tones, layer.addressing, corners};
+  for (Vector2d& corner : corners) corner = layer.scaled(corner);
+  return {layer.tones, addressing(triangle), corners};
 }
 
 double ToneField::asked(const SurfacePoint& point) const {
@@ -278,6 +373,13 @@ ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const
     sum.square += integral.square;
   });
   return sum;
+}
+
+double asked_mass_m2(const ToneField& tone) {
+  const std::array<Vector2d, 3> whole{Vector2d(0, 0), Vector2d(1, 0), Vector2d(0, 1)};
+  double mass = 0;
+  for (std::uint32_t t = 0; t < tone.mesh().triangle_count(); ++t) mass += tone.integrate(t, whole).mass;
+  return mass;
 }
 
 }  // namespace hilbrush

@@ -73,6 +73,7 @@ class Workpiece {
                                       .spot_pitches = spot_diameter_m(cell_, pitch_m) / pitch_m});
     if (!tone.warning.empty()) std::fprintf(stderr, "painted_bench: %s\n", tone.warning.c_str());
     tone.options.untextured = Untextured::kMaterial;
+    tone.options.pitch_m = pitch_m;
 
     Painted painted;
     painted.tone.emplace(mesh_, tone.options);

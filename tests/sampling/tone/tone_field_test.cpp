@@ -74,6 +74,8 @@ TEST(ToneField, IntegralsOfTexturesAreExactHoweverTheyAreAddressed) {
         ToneOptions options;
         options.curve = bent_curve();
         expect_exact(ToneField(mesh, options), random, 2e-5 * std::max(1., extent));
+        options.pitch_m = .002;
+        expect_exact(ToneField(mesh, options), random, 2e-5 * std::max(1., extent));
       }
 }
 
