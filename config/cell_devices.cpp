@@ -30,7 +30,8 @@ AxisBounds bounds_of(const AxisDescription& axis) {
   return {axis.min, axis.max, axis.speed_max, axis.acceleration_max};
 }
 
-/// Reads sign and offset; also steps_per_unit if `has_steps`, else the device counts in degrees or millimeters.
+/// Reads sign and offset; also steps_per_unit if `has_steps`, else the device counts in degrees or
+/// millimeters.
 AxisScale read_scale(JsonObject& json, std::size_t axis, bool has_steps) {
   const char* unit = is_prismatic(axis) ? "mm" : "deg";
   const double unit_si = is_prismatic(axis) ? 1e-3 : kDegree;
@@ -73,7 +74,8 @@ DobotOptions read_dobot(JsonObject& json, const DeviceContext& context) {
     json.object("axes", [&](JsonObject& axes) {
       for (std::size_t i = 0; i < 4; ++i)
         if (axes.has(kAxisNames[i]))
-          axes.object(kAxisNames[i], [&](JsonObject& axis) { options.scales[i] = read_scale(axis, i, false); });
+          axes.object(kAxisNames[i],
+                      [&](JsonObject& axis) { options.scales[i] = read_scale(axis, i, false); });
     });
   return options;
 }
@@ -143,8 +145,8 @@ LaserOptions read_laser_link(JsonObject& json, const DeviceContext& context) {
   if (json.has("arm_timeout_s")) options.arm_timeout_s = json.quantity("arm_timeout_s", {1, 3600});
   if (json.has("command_gap_ms")) options.command_gap_s = json.quantity("command_gap_ms", {0, 1000});
   if (json.has("heartbeat_ms")) options.heartbeat_s = json.quantity("heartbeat_ms", {1, 1000});
-  options.heartbeats_missed =
-      static_cast<int>(json.optional_integer("heartbeats_missed", 1, 100).value_or(options.heartbeats_missed));
+  options.heartbeats_missed = static_cast<int>(
+      json.optional_integer("heartbeats_missed", 1, 100).value_or(options.heartbeats_missed));
   return options;
 }
 
@@ -163,7 +165,8 @@ GateOptions read_gate(JsonObject& json, bool can_be_own, bool has_robot_outputs)
 
 /// Reads a driver's name, from a text or from an object's "driver"; `visit` gets the object of a real device.
 template <class Visit>
-void read_device(JsonObject& devices, const std::string& key, const std::vector<std::string>& known, Visit visit) {
+void read_device(JsonObject& devices, const std::string& key, const std::vector<std::string>& known,
+                 Visit visit) {
   const auto check = [&](JsonObject& at, const std::string& at_key, const std::string& name) {
     std::string all;
     for (const std::string& driver : known) {
@@ -188,28 +191,31 @@ void read_device(JsonObject& devices, const std::string& key, const std::vector<
 
 }  // namespace
 
-CellDeviceOptions read_cell_devices(JsonObject& devices, const CellDescription& cell, const fs::path& cell_folder) {
+CellDeviceOptions read_cell_devices(JsonObject& devices, const CellDescription& cell,
+                                    const fs::path& cell_folder) {
   CellDeviceOptions options;
   const DeviceContext context{cell, cell_folder};
-  read_device(devices, "robot", {kSimulated, kDobot, kModbusAxes}, [&](JsonObject& device, const std::string& driver) {
-    if (driver == kDobot)
-      options.robot = read_dobot(device, context);
-    else
-      options.robot = read_modbus_group<4>(device, kJ1, true, context);
-  });
+  read_device(devices, "robot", {kSimulated, kDobot, kModbusAxes},
+              [&](JsonObject& device, const std::string& driver) {
+                if (driver == kDobot)
+                  options.robot = read_dobot(device, context);
+                else
+                  options.robot = read_modbus_group<4>(device, kJ1, true, context);
+              });
   read_device(devices, "table", {kSimulated, kOrientalAz, kModbusAxes},
               [&](JsonObject& device, const std::string& driver) {
                 options.table = read_modbus_group<2>(device, kTilt, driver == kModbusAxes, context);
               });
   const bool has_outputs = std::holds_alternative<DobotOptions>(options.robot);
-  read_device(devices, "laser", {kSimulated, kObis, kCobolt}, [&](JsonObject& device, const std::string& driver) {
-    const LaserOptions laser = read_laser_link(device, context);
-    const GateOptions gate = read_gate(device, driver == kCobolt, has_outputs);
-    if (driver == kObis)
-      options.laser = ObisDevice{laser, gate};
-    else
-      options.laser = CoboltDevice{laser, gate};
-  });
+  read_device(devices, "laser", {kSimulated, kObis, kCobolt},
+              [&](JsonObject& device, const std::string& driver) {
+                const LaserOptions laser = read_laser_link(device, context);
+                const GateOptions gate = read_gate(device, driver == kCobolt, has_outputs);
+                if (driver == kObis)
+                  options.laser = ObisDevice{laser, gate};
+                else
+                  options.laser = CoboltDevice{laser, gate};
+              });
   return options;
 }
 

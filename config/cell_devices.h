@@ -22,7 +22,8 @@ namespace hilbrush {
 
 struct SimulatedDevice {};
 
-/// N axes, each a Modbus drive: one of Oriental Motor's AZ family, or any drive that a register map describes.
+/// N axes, each a Modbus drive: one of Oriental Motor's AZ family, or any drive that a register map
+/// describes.
 template <std::size_t N>
 struct ModbusGroupOptions {
   std::array<ModbusAxisOptions, N> axes;
@@ -60,8 +61,8 @@ struct DriverNames {
 DriverNames driver_names(const CellDeviceOptions& options);
 
 class JsonObject;
-/// Reads $.devices, after the rest of the cell: the limits of axes and laser come from `cell`. Relative paths of
-/// register maps start at `cell_folder`. @throws InputError with the JSON path.
+/// Reads $.devices, after the rest of the cell: the limits of axes and laser come from `cell`. Relative paths
+/// of register maps start at `cell_folder`. @throws InputError with the JSON path.
 CellDeviceOptions read_cell_devices(JsonObject& devices, const CellDescription& cell,
                                     const std::filesystem::path& cell_folder);
 

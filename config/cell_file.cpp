@@ -55,12 +55,13 @@ void read_column(JsonObject& json, CellDescription::Arm& arm) {
     return;
   }
   arm.column.radius_m = json.quantity("column_radius_mm", {0, 2000});
-  arm.column.height_m = json.has("column_height_mm") ? json.quantity("column_height_mm", {0, 5000})
-                                                     : std::max(0., arm.upper_link.height_m - arm.upper_link.radius_m);
+  arm.column.height_m = json.has("column_height_mm")
+                            ? json.quantity("column_height_mm", {0, 5000})
+                            : std::max(0., arm.upper_link.height_m - arm.upper_link.radius_m);
 }
 
-/// The links run above the highest position of the lens unless the file gives their height; the quill ends in the
-/// forearm.
+/// The links run above the highest position of the lens unless the file gives their height; the quill ends in
+/// the forearm.
 void read_links(JsonObject& json, const AxisDescription& j3, const CellDescription::Lens& lens,
                 CellDescription::Arm& arm) {
   constexpr double kRadiusM = .035;
@@ -71,8 +72,8 @@ void read_links(JsonObject& json, const AxisDescription& j3, const CellDescripti
   const double lens_top_m = (lens.far_m - arm.flange_to_focus_m) * std::sin(arm.beam_depression) +
                             lens.radius_m * std::cos(arm.beam_depression);
   arm.fore_link.radius_m = or_else("forearm_radius_mm", {0, 1000}, kRadiusM);
-  arm.fore_link.height_m =
-      or_else("forearm_height_mm", {-5000, 5000}, j3.max + std::max(lens_top_m, 0.) + kGapM + arm.fore_link.radius_m);
+  arm.fore_link.height_m = or_else("forearm_height_mm", {-5000, 5000},
+                                   j3.max + std::max(lens_top_m, 0.) + kGapM + arm.fore_link.radius_m);
   arm.upper_link.radius_m = or_else("upper_arm_radius_mm", {0, 1000}, arm.fore_link.radius_m);
   arm.upper_link.height_m = or_else("upper_arm_height_mm", {-5000, 5000}, arm.fore_link.height_m);
   arm.quill_length_m = or_else("quill_length_mm", {0, 5000}, std::max(arm.fore_link.height_m - j3.min, .001));
@@ -127,14 +128,16 @@ ToneCurveEntry read_tone_curve(JsonObject& json, double asked_max) {
   entry.wanted = json.numbers("wanted", 2, kTonePointsMax, {0, 1});
   entry.asked = json.numbers("asked", entry.wanted.size(), entry.wanted.size(), {0, asked_max});
   if (entry.wanted.front() != 0 || entry.wanted.back() != 1) json.refuse("wanted", "does not go from 0 to 1");
-  if (std::adjacent_find(entry.wanted.begin(), entry.wanted.end(), std::greater_equal<>()) != entry.wanted.end())
+  if (std::adjacent_find(entry.wanted.begin(), entry.wanted.end(), std::greater_equal<>()) !=
+      entry.wanted.end())
     json.refuse("wanted", "must increase from each number to the next");
   if (!std::is_sorted(entry.asked.begin(), entry.asked.end())) json.refuse("asked", "must not decrease");
   return entry;
 }
 
 void read_paint(JsonObject& json, CellDescription::Paint& paint) {
-  constexpr std::array kResponses{PaintResponse::kLinear, PaintResponse::kSaturating, PaintResponse::kSigmoid};
+  constexpr std::array kResponses{PaintResponse::kLinear, PaintResponse::kSaturating,
+                                  PaintResponse::kSigmoid};
   paint.response = kResponses[json.choice("response", {"linear", "saturating", "sigmoid"})];
   paint.reflectance_white = json.number("reflectance_white", {0.01, 1});
   paint.reflectance_black = json.number("reflectance_black", {0, 1});
@@ -166,7 +169,8 @@ void read_interpolation(JsonObject& json, CellDescription::Motion& motion) {
   constexpr std::array kInterpolations{Interpolation::kUnknown, Interpolation::kIndependent,
                                        Interpolation::kCoordinated};
   const auto read = [&](const char* chain, Interpolation& interpolation) {
-    if (json.has(chain)) interpolation = kInterpolations[json.choice(chain, {"unknown", "independent", "coordinated"})];
+    if (json.has(chain))
+      interpolation = kInterpolations[json.choice(chain, {"unknown", "independent", "coordinated"})];
   };
   read("robot", motion.robot);
   read("table", motion.table);
@@ -204,16 +208,18 @@ CellDescription read_cell(JsonObject& json, const fs::path& folder, CellDeviceOp
   json.object("timing", [&](JsonObject& timing) { read_timing(timing, cell.timing); });
   if (json.has("interpolation"))
     json.object("interpolation", [&](JsonObject& motion) { read_interpolation(motion, cell.motion); });
-  if (json.has("measured")) json.object("measured", [&](JsonObject& measured) { read_measured(measured, cell); });
-  json.object("devices", [&](JsonObject& devices) { device_options = read_cell_devices(devices, cell, folder); });
+  if (json.has("measured"))
+    json.object("measured", [&](JsonObject& measured) { read_measured(measured, cell); });
+  json.object("devices",
+              [&](JsonObject& devices) { device_options = read_cell_devices(devices, cell, folder); });
   json.object("simulation", [&](JsonObject& simulation) {
     cell.simulation.time_scale = simulation.number("time_scale", {0, 1000});
   });
   return cell;
 }
 
-/// The folder with the shipped cells. It comes from the environment because no settings are read yet when a cell is
-/// looked for.
+/// The folder with the shipped cells. It comes from the environment because no settings are read yet when a
+/// cell is looked for.
 fs::path cells_folder() {
   if (const char* folder = std::getenv("HILBRUSH_CELLS"); folder != nullptr && *folder != '\0') return folder;
   return shipped_folder("cells");
@@ -261,14 +267,15 @@ std::vector<std::string> cell_warnings(const CellDescription& cell) {
     out << value;
     return out.str();
   };
-  // Measured on simulated film: at 1.0 pitches dark areas stay unfilled, at 2.0 detail is lost in saturated paint;
-  // 1.41 is best.
+  // Measured on simulated film: at 1.0 pitches dark areas stay unfilled, at 2.0 detail is lost in saturated
+  // paint; 1.41 is best.
   const double pitches = cell.laser.spot_pitches;
   if (!cell.laser.spot_diameter_m && (pitches < 1.2 || pitches > 1.8))
     warn("$.laser.spot_pitches",
          text(pitches) + " is outside 1.2 to 1.8: dark areas stay unfilled below, detail is lost above");
   if (cell.lens.near_m < cell.lens.radius_m)
-    warn("$.lens.near_mm", "the lens comes closer to the focus than its own radius: most oblique beams will collide");
+    warn("$.lens.near_mm",
+         "the lens comes closer to the focus than its own radius: most oblique beams will collide");
   if (cell.lens.far_m < cell.arm.flange_to_focus_m)
     warn("$.lens.far_mm", "the lens body ends before it reaches the flange");
   const auto& fore = cell.arm.fore_link;
@@ -276,8 +283,8 @@ std::vector<std::string> cell_warnings(const CellDescription& cell) {
     warn("$.arm.forearm_height_mm", "the flange would run into the forearm at the top of J3");
   if (cell.paint.tone_curves.empty())
     warn("$.paint.tone_curves", "none: pictures lose 14 to 18 dB without one; `hilbrush calibrate` makes it");
-  const double reach =
-      cell.arm.upper_arm_m + cell.arm.forearm_m + cell.arm.flange_to_focus_m * std::cos(cell.arm.beam_depression);
+  const double reach = cell.arm.upper_arm_m + cell.arm.forearm_m +
+                       cell.arm.flange_to_focus_m * std::cos(cell.arm.beam_depression);
   if (cell.table.tilt_axis_W.head<2>().norm() > reach)
     warn("$.table.tilt_axis_mm", "farther from J1 than the arm reaches");
   if (cell.arm.column.radius_m + cell.table.plate_radius_m > cell.table.tilt_axis_W.head<2>().norm())
@@ -288,7 +295,8 @@ std::vector<std::string> cell_warnings(const CellDescription& cell) {
 std::vector<std::string> known_cells() {
   std::vector<std::string> names;
   std::error_code error;
-  for (fs::directory_iterator entry(cells_folder(), error), end; !error && entry != end; entry.increment(error))
+  for (fs::directory_iterator entry(cells_folder(), error), end; !error && entry != end;
+       entry.increment(error))
     if (entry->path().extension() == ".json") names.push_back(entry->path().stem().string());
   std::sort(names.begin(), names.end());
   return names;
@@ -318,7 +326,8 @@ const ToneCurveEntry* find_tone_curve(const CellDescription::Paint& paint, const
   double best_off = 0;
   for (const ToneCurveEntry& entry : paint.tone_curves) {
     if (entry.sampler != use.sampler || entry.curve != use.curve || entry.levels != use.levels) continue;
-    const double off = entry.spot_pitches && use.spot_pitches ? std::abs(*entry.spot_pitches - *use.spot_pitches) : 0;
+    const double off =
+        entry.spot_pitches && use.spot_pitches ? std::abs(*entry.spot_pitches - *use.spot_pitches) : 0;
     if (best != nullptr && off >= best_off) continue;
     best = &entry;
     best_off = off;
@@ -333,8 +342,8 @@ std::string describe(const ToneCurveUse& use) {
   return text;
 }
 
-/// The curve of the same sampler and levels on the other space-filling curve, or null. Laminar slices are no such
-/// curve.
+/// The curve of the same sampler and levels on the other space-filling curve, or null. Laminar slices are no
+/// such curve.
 const ToneCurveEntry* find_similar_tone_curve(const CellDescription::Paint& paint, ToneCurveUse use) {
   if (use.curve == "laminar") return nullptr;
   for (const char* curve : {"hilbert", "peano2"}) {

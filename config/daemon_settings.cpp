@@ -14,7 +14,8 @@ DaemonSettings::AccessRule read_rule(JsonObject& json) {
   DaemonSettings::AccessRule rule;
   rule.user = json.optional_text("user").value_or("");
   rule.group = json.optional_text("group").value_or("");
-  if (rule.user.empty() == rule.group.empty()) json.refuse("user", "a rule is for a user or for a group: give one");
+  if (rule.user.empty() == rule.group.empty())
+    json.refuse("user", "a rule is for a user or for a group: give one");
   rule.may_operate = json.choice("may", {"look", "operate"}) == 1;
   return rule;
 }
@@ -43,7 +44,8 @@ DaemonSettings daemon_settings_from_json(const std::string& text, const std::str
   read_json_object(text, origin, [&](JsonObject& json) {
     if (json.has("access")) {
       settings.access.emplace();
-      json.objects("access", kRulesMax, [&](JsonObject& rule) { settings.access->push_back(read_rule(rule)); });
+      json.objects("access", kRulesMax,
+                   [&](JsonObject& rule) { settings.access->push_back(read_rule(rule)); });
     }
     if (json.has("tcp")) json.object("tcp", [&](JsonObject& tcp) { settings.tcp = read_tcp(tcp); });
   });

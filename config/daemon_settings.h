@@ -8,10 +8,12 @@
 /// The daemon's settings file: which users may connect, and whether TCP is served besides the Unix socket.
 ///
 ///   {"access": [{"user": "anna", "may": "operate"}, {"group": "staff", "may": "look"}],
-///    "tcp": {"host": "127.0.0.1", "port": 4777, "tokens": [{"user": "anna", "sha256": "<64 hexadecimal digits>"}]}}
+///    "tcp": {"host": "127.0.0.1", "port": 4777, "tokens": [{"user": "anna", "sha256": "<64 hexadecimal
+///    digits>"}]}}
 ///
-/// Without `access` every user that can open the Unix socket may operate. With it only the users and groups that it
-/// names; root and the daemon's own user always may. "look" includes stopping the cell. Without `tcp` there is no TCP.
+/// Without `access` every user that can open the Unix socket may operate. With it only the users and groups
+/// that it names; root and the daemon's own user always may. "look" includes stopping the cell. Without `tcp`
+/// there is no TCP.
 namespace hilbrush {
 
 struct DaemonSettings {

@@ -37,7 +37,8 @@ bool has_axis(WireFaultKind kind) {
   return kind == WireFaultKind::kAxisStuck || kind == WireFaultKind::kAxisDrift;
 }
 bool has_device(WireFaultKind kind) {
-  return is_of_exchange(kind) || kind == WireFaultKind::kStaleInPosition || kind == WireFaultKind::kDeviceAlarm;
+  return is_of_exchange(kind) || kind == WireFaultKind::kStaleInPosition ||
+         kind == WireFaultKind::kDeviceAlarm;
 }
 bool has_duration(WireFaultKind kind) {
   return kind == WireFaultKind::kLateAnswer || kind == WireFaultKind::kDroppedConnection ||
@@ -51,7 +52,8 @@ WireFault read_fault(JsonObject& json) {
     fault.device = static_cast<WireDevice>(json.choice("device", names(kWireDeviceNames)));
   if (fault.kind == WireFaultKind::kDeviceAlarm && fault.device == WireDevice::kLaser)
     json.refuse("device", "has no alarm of its own: use interlock_open");
-  if (is_of_exchange(fault.kind)) fault.messages = json.optional_integer("messages", 1, kCountMax).value_or(1);
+  if (is_of_exchange(fault.kind))
+    fault.messages = json.optional_integer("messages", 1, kCountMax).value_or(1);
   if (has_duration(fault.kind)) fault.duration_s = json.quantity("duration_ms", {0, kMaxS * 1e3});
   if (has_axis(fault.kind)) fault.axis = json.choice("axis", names(kAxisNames));
   if (fault.kind == WireFaultKind::kAxisDrift)

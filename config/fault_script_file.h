@@ -12,8 +12,9 @@
 ///     {"kind": "axis_drift", "at_s": 3.5, "axis": "j2", "speed_deg_s": 1.5, "duration_ms": 200},
 ///     {"kind": "power_limit", "at_s": 10, "share": 0.4, "duration_ms": 1000}]}
 ///
-/// Triggers: `at_s`, `at_message` (number of the device's message, from 1), `phase` (settled, moving, settling, pulse)
-/// with `occurrence` and `delay_ms`; at least one of the three. Keys that a kind of fault does not use are errors.
+/// Triggers: `at_s`, `at_message` (number of the device's message, from 1), `phase` (settled, moving,
+/// settling, pulse) with `occurrence` and `delay_ms`; at least one of the three. Keys that a kind of fault
+/// does not use are errors.
 namespace hilbrush {
 
 /// @throws InputError

@@ -38,7 +38,8 @@ void read_amounts(JsonObject& json, JobSettings& settings) {
 }
 
 void read_incidence(JsonObject& json, JobSettings& settings) {
-  settings.max_incidence_deg = json.optional_number("max_incidence_deg", {1, 45}).value_or(settings.max_incidence_deg);
+  settings.max_incidence_deg =
+      json.optional_number("max_incidence_deg", {1, 45}).value_or(settings.max_incidence_deg);
   const std::optional<double> preferred = json.optional_number("preferred_incidence_deg", {0, 45});
   if (preferred && *preferred > settings.max_incidence_deg)
     json.refuse("preferred_incidence_deg", "above max_incidence_deg");
@@ -91,7 +92,8 @@ void read_sampling(JsonObject& json, JobSettings& settings) {
   if (settings.curve != CurveKind::kLaminar) return;
   if (settings.sampler != Sampler::kCentroid)
     json.refuse("sampler", "laminar slices have only one way to place dots: leave sampler out");
-  if (settings.largest_gap_pitches) json.refuse("largest_gap_pitches", "laminar slices have no strata to fill");
+  if (settings.largest_gap_pitches)
+    json.refuse("largest_gap_pitches", "laminar slices have no strata to fill");
 }
 
 JobSettings read_settings(JsonObject& json) {
@@ -124,7 +126,8 @@ JobSettings job_settings_from_json(const std::string& text, const std::string& o
 
 std::string job_settings_to_json(const JobSettings& settings) {
   // The default dpi is written out, so that equal jobs have equal text.
-  const std::optional<double> dpi = settings.dpi || settings.dots ? settings.dpi : std::optional<double>(kDefaultDpi);
+  const std::optional<double> dpi =
+      settings.dpi || settings.dots ? settings.dpi : std::optional<double>(kDefaultDpi);
   const nlohmann::ordered_json json{
       {"dpi", or_null(dpi)},
       {"dots", or_null(settings.dots)},

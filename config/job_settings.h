@@ -10,7 +10,8 @@
 #include "sampling/options/sample_options.h"
 #include "sampling/options/tone_options.h"
 
-/// The settings of one job: the keys of a job file, of "settings" in job.submit, and the flags of the command (size_mm:
+/// The settings of one job: the keys of a job file, of "settings" in job.submit, and the flags of the command
+/// (size_mm:
 /// --size-mm).
 namespace hilbrush {
 
@@ -34,7 +35,8 @@ struct FixtureSettings {
   std::optional<double> post_height_mm, post_radius_mm, plate_radius_mm;
 };
 
-/// Where the object stands: turned about the axis of the post, then shifted from the center of the post's top.
+/// Where the object stands: turned about the axis of the post, then shifted from the center of the post's
+/// top.
 struct MountingSettings {
   std::array<double, 3> offset_mm{};
   double turn_deg = 0;
@@ -51,8 +53,8 @@ struct JobSettings {
   CurveKind curve = CurveKind::kHilbert;
   DensitySource density = DensitySource::kTexture;
   std::uint64_t seed = 1;
-  int levels = 1;                             ///< energies that a dot may have, 1 to 4
-  int predictive_rounds = 0;                  ///< of the loop that predicts the picture and corrects the tone, 0 to 4
+  int levels = 1;             ///< energies that a dot may have, 1 to 4
+  int predictive_rounds = 0;  ///< of the loop that predicts the picture and corrects the tone, 0 to 4
   std::optional<double> largest_gap_pitches;  ///< holes wider than this are filled with dots
   int fine_passes = 24;                       ///< of the sampler "fine", each over all dots
   ToneMapping tone_curve = ToneMapping::kCalibrated;
@@ -67,14 +69,16 @@ struct JobSettings {
   bool dry_run = false;
 };
 
-/// Strict: unknown keys, wrong types and values out of range are InputErrors with the JSON path; `origin` names the
-/// file, if there is one. `text` is a JSON object; every key may be missing or null. dpi becomes 100 if neither dpi nor
-/// dots is given.
+/// Strict: unknown keys, wrong types and values out of range are InputErrors with the JSON path; `origin`
+/// names the file, if there is one. `text` is a JSON object; every key may be missing or null. dpi becomes
+/// 100 if neither dpi nor dots is given.
 JobSettings job_settings_from_json(const std::string& text, const std::string& origin = {});
-/// Canonical: all keys in a fixed order (null where nothing is set), so that its hash identifies the settings.
+/// Canonical: all keys in a fixed order (null where nothing is set), so that its hash identifies the
+/// settings.
 std::string job_settings_to_json(const JobSettings& settings);
-/// Names the settings that shape a program. The cell has a hash of its own, and a dry run changes nothing about a
-/// program, so neither is part of it. Jobs and programs both carry it: the daemon paints a job only if they agree.
+/// Names the settings that shape a program. The cell has a hash of its own, and a dry run changes nothing
+/// about a program, so neither is part of it. Jobs and programs both carry it: the daemon paints a job only
+/// if they agree.
 std::string job_settings_sha256(JobSettings settings);
 
 SampleOptions sample_options(const JobSettings& settings);

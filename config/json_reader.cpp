@@ -43,7 +43,8 @@ double unit_of(const std::string& key) {
   throw std::logic_error("key without a unit: " + key);  // an error of the reading code, not of the file
 }
 
-/// Thousandths are divided by 1000 rather than multiplied by .001, so that 0.1 mm and 1e-4 m are the same double.
+/// Thousandths are divided by 1000 rather than multiplied by .001, so that 0.1 mm and 1e-4 m are the same
+/// double.
 double to_si(double value, double unit) {
   return unit == 1e-3 ? value / 1e3 : value * unit;
 }
@@ -78,16 +79,18 @@ std::string describe(JsonRange range) {
   return "a number from " + format_number(range.min) + " to " + format_number(range.max);
 }
 
-/// Keys with other characters than letters, digits, _ and - are quoted, so that a path stays readable and on one line.
+/// Keys with other characters than letters, digits, _ and - are quoted, so that a path stays readable and on
+/// one line.
 std::string path_step(const std::string& key) {
-  const bool is_plain = !key.empty() && key.size() <= 60 && std::all_of(key.begin(), key.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '_' || c == '-';
-  });
+  const bool is_plain =
+      !key.empty() && key.size() <= 60 && std::all_of(key.begin(), key.end(), [](unsigned char c) {
+        return std::isalnum(c) != 0 || c == '_' || c == '-';
+      });
   return is_plain ? "." + key : "[" + describe(Json(key)) + "]";
 }
 
-/// Follows the parser through the document and refuses what the finished tree no longer shows: duplicate keys and
-/// depth.
+/// Follows the parser through the document and refuses what the finished tree no longer shows: duplicate keys
+/// and depth.
 class StructureCheck {
  public:
   StructureCheck(const std::string& origin, const JsonLimits& limits) : origin_(origin), limits_(limits) {}
@@ -97,7 +100,8 @@ class StructureCheck {
       case Json::parse_event_t::object_start:
       case Json::parse_event_t::array_start:
         if (depth >= limits_.depth)
-          throw InputError(join(origin_, path()), "nested more than " + std::to_string(limits_.depth) + " levels deep");
+          throw InputError(join(origin_, path()),
+                           "nested more than " + std::to_string(limits_.depth) + " levels deep");
         levels_.emplace_back();
         break;
       case Json::parse_event_t::object_end:
@@ -107,7 +111,8 @@ class StructureCheck {
       case Json::parse_event_t::key: {
         Level& level = levels_.back();
         level.key = parsed.get<std::string>();
-        if (!level.keys.insert(level.key).second) throw InputError(join(origin_, path()), "this key appears twice");
+        if (!level.keys.insert(level.key).second)
+          throw InputError(join(origin_, path()), "this key appears twice");
         break;
       }
       case Json::parse_event_t::value:
@@ -140,11 +145,13 @@ class StructureCheck {
   const std::size_t line_start = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
   const std::size_t column = line_start == std::string::npos ? end + 1 : end - line_start;
   // The library's sentence follows "...column N: "; the text before it repeats the position.
-  if (const std::size_t start = reason.find(": "); start != std::string::npos) reason = reason.substr(start + 2);
+  if (const std::size_t start = reason.find(": "); start != std::string::npos)
+    reason = reason.substr(start + 2);
   if (origin.empty())
-    throw InputError("$",
-                     "not JSON at line " + std::to_string(line) + ", column " + std::to_string(column) + ": " + reason);
-  throw InputError(origin + ":" + std::to_string(line), "not JSON at column " + std::to_string(column) + ": " + reason);
+    throw InputError("$", "not JSON at line " + std::to_string(line) + ", column " + std::to_string(column) +
+                              ": " + reason);
+  throw InputError(origin + ":" + std::to_string(line),
+                   "not JSON at column " + std::to_string(column) + ": " + reason);
 }
 
 Json parse_strictly(const std::string& text, const std::string& origin, const JsonLimits& limits) {
@@ -205,7 +212,8 @@ std::optional<std::string> nearest_word(const std::string& word, const std::vect
 
 JsonObject::JsonObject(const Json& value, std::string origin, std::string path)
     : value_(value), origin_(std::move(origin)), path_(std::move(path)) {
-  if (!value.is_object()) throw InputError(join(origin_, path_), "expected an object, found " + describe(value));
+  if (!value.is_object())
+    throw InputError(join(origin_, path_), "expected an object, found " + describe(value));
 }
 
 bool JsonObject::is_text(const std::string& key) const {
@@ -286,8 +294,8 @@ std::string JsonObject::text(const std::string& key, std::size_t length_max) {
   if (!found.is_string()) refuse(key, "expected a text, found " + describe(found));
   auto text = found.get<std::string>();
   if (text.empty() || text.size() > length_max)
-    refuse(key,
-           "expected a text of 1 to " + std::to_string(length_max) + " bytes, found " + std::to_string(text.size()));
+    refuse(key, "expected a text of 1 to " + std::to_string(length_max) + " bytes, found " +
+                    std::to_string(text.size()));
   if (std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     refuse(key, "expected a text without control characters, found " + describe(found));
   return text;
@@ -305,8 +313,9 @@ std::size_t JsonObject::choice(const std::string& key, const std::vector<std::st
 
 std::vector<double> JsonObject::numbers(const std::string& key, std::size_t count_min, std::size_t count_max,
                                         JsonRange range) {
-  const std::string count = count_min == count_max ? std::to_string(count_min)
-                                                   : std::to_string(count_min) + " to " + std::to_string(count_max);
+  const std::string count = count_min == count_max
+                                ? std::to_string(count_min)
+                                : std::to_string(count_min) + " to " + std::to_string(count_max);
   const std::string expected = "a list of " + count + " numbers";
   const Json& found = value(key, expected.c_str());
   if (!found.is_array() || found.size() < count_min || found.size() > count_max)
@@ -337,7 +346,8 @@ void JsonObject::object(const std::string& key, const Visit& visit) {
 void JsonObject::objects(const std::string& key, std::size_t count_max, const Visit& visit) {
   const Json& found = value(key, "a list of objects");
   if (!found.is_array() || found.size() > count_max)
-    refuse(key, "expected a list of at most " + std::to_string(count_max) + " objects, found " + describe(found));
+    refuse(key,
+           "expected a list of at most " + std::to_string(count_max) + " objects, found " + describe(found));
   for (std::size_t i = 0; i < found.size(); ++i) {
     JsonObject inner(found[i], origin_, path_ + path_step(key) + "[" + std::to_string(i) + "]");
     visit(inner);
@@ -400,7 +410,8 @@ std::string read_text_file(const std::string& file, std::size_t bytes_max) {
   std::array<char, 65536> block;
   while (in.read(block.data(), block.size()) || in.gcount() > 0) {
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-    if (text.size() > bytes_max) throw InputError(file, "longer than " + std::to_string(bytes_max) + " bytes");
+    if (text.size() > bytes_max)
+      throw InputError(file, "longer than " + std::to_string(bytes_max) + " bytes");
   }
   return text;
 }

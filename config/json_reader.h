@@ -10,9 +10,9 @@
 
 #include "sampling/base/input_error.h"
 
-/// Strict reading of JSON that people write. Every value is read by key, with its range. Keys that are not read are
-/// errors, and so are duplicate keys, wrong types and documents that are too large or too deep. Each error is an
-/// InputError whose at() is "<origin>: <JSON path>" (or the path alone), such as
+/// Strict reading of JSON that people write. Every value is read by key, with its range. Keys that are not
+/// read are errors, and so are duplicate keys, wrong types and documents that are too large or too deep. Each
+/// error is an InputError whose at() is "<origin>: <JSON path>" (or the path alone), such as
 /// "cells/default.json: $.axes.j1.max_deg". An origin that is a JSON path is continued by the path.
 ///
 /// The unit is part of the key (max_deg, radius_mm, power_max_mw); values are returned in SI units.
@@ -28,8 +28,8 @@ struct JsonRange {
   double min, max;
 };
 
-/// One object of the document. Valid only during the visit that receives it; when the visit returns, every key must
-/// have been read.
+/// One object of the document. Valid only during the visit that receives it; when the visit returns, every
+/// key must have been read.
 class JsonObject {
  public:
   JsonObject(const nlohmann::json& value, std::string origin, std::string path);
@@ -48,7 +48,8 @@ class JsonObject {
   std::string text(const std::string& key, std::size_t length_max = 200);
   /// The index in `choices` of the text.
   std::size_t choice(const std::string& key, const std::vector<std::string>& choices);
-  std::vector<double> numbers(const std::string& key, std::size_t count_min, std::size_t count_max, JsonRange range);
+  std::vector<double> numbers(const std::string& key, std::size_t count_min, std::size_t count_max,
+                              JsonRange range);
   /// A list of numbers whose key ends in a unit, returned in SI units.
   std::vector<double> quantities(const std::string& key, std::size_t count, JsonRange range);
 

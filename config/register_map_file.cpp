@@ -60,7 +60,9 @@ class MapReader {
     map_.stop = read_steps(json, "stop");
     map_.resume = read_steps(json, "resume");
     map_.clear_fault = read_steps(json, "clear_fault");
-    const auto takes_target = [](const RegisterStep& step) { return step.source == RegisterStep::Source::kTarget; };
+    const auto takes_target = [](const RegisterStep& step) {
+      return step.source == RegisterStep::Source::kTarget;
+    };
     if (std::none_of(map_.move.begin(), map_.move.end(), takes_target) &&
         std::none_of(map_.prepare.begin(), map_.prepare.end(), takes_target))
       json.refuse("move", "neither move nor prepare writes the target");
@@ -112,8 +114,8 @@ class MapReader {
     return steps;
   }
 
-  /// `prepare` is written while the beam is on, so it must have no effect: only numbers in registers that no handshake
-  /// uses.
+  /// `prepare` is written while the beam is on, so it must have no effect: only numbers in registers that no
+  /// handshake uses.
   void check_prepare(JsonObject& json) {
     for (const RegisterStep& step : map_.prepare) {
       if (step.kind != RegisterStep::Kind::kWrite || step.source == RegisterStep::Source::kConstant)
@@ -123,8 +125,9 @@ class MapReader {
         for (const RegisterStep& other : *steps)
           if (other.kind != RegisterStep::Kind::kPause &&
               share_words(map_.registers[other.reg], map_.registers[step.reg]))
-            json.refuse("prepare", "writes " + map_.registers[step.reg].name +
-                                       ", which another list uses: registers of a handshake cannot be written ahead");
+            json.refuse("prepare",
+                        "writes " + map_.registers[step.reg].name +
+                            ", which another list uses: registers of a handshake cannot be written ahead");
     }
   }
 
@@ -143,7 +146,8 @@ class MapReader {
     } else {
       step.reg = named(json, "write");
       if (json.has("from"))
-        step.source = static_cast<RegisterStep::Source>(1 + json.choice("from", {"target", "speed", "acceleration"}));
+        step.source =
+            static_cast<RegisterStep::Source>(1 + json.choice("from", {"target", "speed", "acceleration"}));
       else
         step.value = code(json, "value");
     }
@@ -157,7 +161,8 @@ class MapReader {
 
 RegisterMap register_map_from_json(const std::string& text, const std::string& origin) {
   RegisterMap map;
-  read_json_object(text, origin, [&](JsonObject& json) { map = MapReader().read(json); }, {.bytes = kMapBytesMax});
+  read_json_object(text, origin, [&](JsonObject& json) { map = MapReader().read(json); },
+                   {.bytes = kMapBytesMax});
   return map;
 }
 
@@ -174,7 +179,8 @@ fs::path find_register_map(const std::string& name, const fs::path& cell_folder,
   std::string known;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     known += (known.empty() ? "" : ", ") + entry->path().stem().string();
-  throw InputError(at, "no register map at " + file.string() + "; shipped: " + (known.empty() ? "none" : known));
+  throw InputError(at,
+                   "no register map at " + file.string() + "; shipped: " + (known.empty() ? "none" : known));
 }
 
 }  // namespace hilbrush

@@ -42,8 +42,9 @@ OrderedJson laser_entry(const WireEndpoints& endpoints) {
 std::string wired_cell_text(const std::string& cell_text, const WireEndpoints& endpoints, double time_scale) {
   OrderedJson cell = OrderedJson::parse(cell_text, nullptr, false);
   if (!cell.is_object()) throw InputError("$", "is not a JSON object");
-  cell["devices"] = {
-      {"robot", robot_entry(endpoints)}, {"table", table_entry(endpoints)}, {"laser", laser_entry(endpoints)}};
+  cell["devices"] = {{"robot", robot_entry(endpoints)},
+                     {"table", table_entry(endpoints)},
+                     {"laser", laser_entry(endpoints)}};
   cell["simulation"]["time_scale"] = time_scale;
   return cell.dump(2) + "\n";
 }

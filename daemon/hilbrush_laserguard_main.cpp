@@ -1,5 +1,6 @@
-// hilbrush-laserguard: owns a laser's link, so that the laser is turned off whatever happens to the process that uses
-// it. See drivers/guard/guard_server.h. Started by hilbrushd, never by hand: its user's channel is descriptor 3.
+// hilbrush-laserguard: owns a laser's link, so that the laser is turned off whatever happens to the process
+// that uses it. See drivers/guard/guard_server.h. Started by hilbrushd, never by hand: its user's channel is
+// descriptor 3.
 
 #include <sched.h>
 #include <signal.h>
@@ -47,15 +48,16 @@ int catch_signals() {
   ::signal(SIGPIPE, SIG_IGN);
   sigset_t set;
   ::sigemptyset(&set);
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGPWR,
-                           SIGIO, SIGSTKFLT, SIGTSTP, SIGTTIN, SIGTTOU})
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF,
+                           SIGPWR, SIGIO, SIGSTKFLT, SIGTSTP, SIGTTIN, SIGTTOU})
     ::sigaddset(&set, signal);
   for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) ::sigaddset(&set, signal);
   ::sigprocmask(SIG_BLOCK, &set, nullptr);
   return ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
-/// Heartbeats and pulses are timed to the millisecond: where the system allows it, before all ordinary processes.
+/// Heartbeats and pulses are timed to the millisecond: where the system allows it, before all ordinary
+/// processes.
 void take_precedence() {
   constexpr int kPriority = 10;
   const sched_param parameters{kPriority};

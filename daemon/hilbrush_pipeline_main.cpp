@@ -68,18 +68,21 @@ Json run(const std::string& command, const Arguments& arguments, const PipelineL
     return {{"files", files}};
   }
   if (command == "quality")
-    return Json::parse(run_quality(quality_request_from_json(arguments.request_json), arguments.output, listener));
+    return Json::parse(
+        run_quality(quality_request_from_json(arguments.request_json), arguments.output, listener));
   const PipelineRequest request = request_of(arguments);
   if (command == "plan") return Json::parse(run_plan(request, listener));
   if (command == "dry-run") return Json::parse(run_dry_run(request, listener));
-  if (command == "develop") return Json::parse(run_develop(request, arguments.program, arguments.emissions, listener));
+  if (command == "develop")
+    return Json::parse(run_develop(request, arguments.program, arguments.emissions, listener));
   if (command == "calibrate" && arguments.wedge) return Json::parse(run_wedge(request));
   if (command == "calibrate") return Json::parse(run_calibrate(request, arguments.measured, listener));
 
   Joints from{};
   std::copy(arguments.from.begin(), arguments.from.end(), from.begin());
   Json vias = Json::array();
-  for (const Joints& joints : run_approach(request, arguments.program, arguments.next, from)) vias.push_back(joints);
+  for (const Joints& joints : run_approach(request, arguments.program, arguments.next, from))
+    vias.push_back(joints);
   return {{"via", vias}};
 }
 
@@ -90,10 +93,11 @@ std::string without_file(const std::string& text, const std::string& file) {
 
 int run_and_answer(const std::string& command, const Arguments& arguments) {
   ProgressLines progress;
-  const PipelineListener listener{[&progress](const char* stage, double fraction) { progress(stage, fraction); },
-                                  [](const std::string& sentence) {
-                                    print_line({{"warning", sentence}});
-                                  }};
+  const PipelineListener listener{
+      [&progress](const char* stage, double fraction) { progress(stage, fraction); },
+      [](const std::string& sentence) {
+        print_line({{"warning", sentence}});
+      }};
   const auto fail = [](const std::string& at, const std::string& message, ExitCode code) {
     print_line({{"error", {{"at", at}, {"message", message}}}});
     return code;
@@ -120,17 +124,20 @@ void add_commands(CLI::App& app, Arguments& arguments) {
       command->add_option("--settings-json", arguments.settings_json, "job settings, a JSON object");
       command->add_option("--cell", arguments.cell, "cell file or name (default: the settings' cell)");
     }
-    if (has_output) command->add_option("--output", arguments.output, "folder for all files written")->required();
+    if (has_output)
+      command->add_option("--output", arguments.output, "folder for all files written")->required();
     return command;
   };
   add("files", "list all files that the model is read from", true, false);
   add("plan", "write program.ply, dots.ply and report.json", true, true);
   add("dry-run", "plan, paint on the simulated cell, develop", true, true);
-  CLI::App* develop = add("develop", "develop the film from the emissions that a simulated cell recorded", true, true);
+  CLI::App* develop =
+      add("develop", "develop the film from the emissions that a simulated cell recorded", true, true);
   develop->add_option("--program", arguments.program, "program file")->required();
   develop->add_option("--emissions", arguments.emissions, "the cell's record of emissions")->required();
   CLI::App* calibrate = add("calibrate", "make a tone curve from a gray wedge", false, true);
-  auto* measured = calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
+  auto* measured =
+      calibrate->add_option("--measured", arguments.measured, "readings of a wedge that was painted");
   calibrate->add_flag("--wedge", arguments.wedge, "write a wedge to paint and measure")->excludes(measured);
   add("quality", "measure how evenly dots lie", false, true)
       ->add_option("--request-json", arguments.request_json, "what to measure, a JSON object")
@@ -148,7 +155,8 @@ void add_commands(CLI::App& app, Arguments& arguments) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Hilbrush's pipeline: from a model to dots, poses, exposures and pictures. Run by hilbrush and hilbrushd; see "
+      "Hilbrush's pipeline: from a model to dots, poses, exposures and pictures. Run by hilbrush and "
+      "hilbrushd; see "
       "`hilbrush --help`."};
   app.set_version_flag("--version", std::string("hilbrush-pipeline ") + HILBRUSH_VERSION);
   app.require_subcommand(1);

@@ -57,16 +57,19 @@ void serve(Arguments arguments) {
   if (arguments.interpolation) description.motion.robot = *arguments.interpolation;
   if (!arguments.faults.empty()) arguments.wire.faults = hilbrush::load_fault_script(arguments.faults);
 
-  std::unique_ptr<hilbrush::EmissionRecordFile> record;  // outlives the cell, whose destructor may end a pulse
+  std::unique_ptr<hilbrush::EmissionRecordFile>
+      record;  // outlives the cell, whose destructor may end a pulse
   if (!arguments.record.empty()) record = std::make_unique<hilbrush::EmissionRecordFile>(arguments.record);
   WireCell cell(description, arguments.wire);
   if (record) cell.set_emission_sink([&](const hilbrush::Emission& emission) { record->append(emission); });
   if (!arguments.write_cell.empty())
-    write_file(arguments.write_cell, hilbrush::wired_cell_text(cell_text, cell.endpoints(), arguments.wire.time_scale));
+    write_file(arguments.write_cell,
+               hilbrush::wired_cell_text(cell_text, cell.endpoints(), arguments.wire.time_scale));
 
   const auto& ends = cell.endpoints();
   fmt::print(
-      "{{\"ready\":true,\"robot\":{{\"dashboard_port\":{},\"motion_port\":{},\"feedback_port\":{}}},\"table\":\"{}\","
+      "{{\"ready\":true,\"robot\":{{\"dashboard_port\":{},\"motion_port\":{},\"feedback_port\":{}}},"
+      "\"table\":\"{}\","
       "\"laser\":\"{}\"}}\n",
       ends.dashboard_port, ends.motion_port, ends.feedback_port,
       ends.table_serial.empty() ? std::to_string(ends.table_tcp_port) : ends.table_serial, ends.laser_port);
@@ -88,9 +91,10 @@ void add_flags(CLI::App& app, Arguments& arguments) {
   using hilbrush::Interpolation;
   const std::map<std::string, Interpolation> interpolations{{"independent", Interpolation::kIndependent},
                                                             {"coordinated", Interpolation::kCoordinated}};
-  app.add_option("--interpolation", arguments.interpolation,
-                 "how the robot leads its joints: independent or coordinated (default: as the cell file says; its "
-                 "table's drives are independent)")
+  app.add_option(
+         "--interpolation", arguments.interpolation,
+         "how the robot leads its joints: independent or coordinated (default: as the cell file says; its "
+         "table's drives are independent)")
       ->transform(CLI::CheckedTransformer(interpolations, CLI::ignore_case));
   app.add_option("--faults", arguments.faults, "fault script (JSON)");
   app.add_option("--record", arguments.record, "append every emission to this file");
@@ -99,8 +103,10 @@ void add_flags(CLI::App& app, Arguments& arguments) {
       ->capture_default_str();
   app.add_option("--table", wire.table, "oriental-az, cia402 or leadshine-pr")
       ->transform(CLI::CheckedTransformer(tables, CLI::ignore_case));
-  app.add_flag("--table-serial", wire.is_table_serial, "Modbus RTU on a pseudo-terminal instead of Modbus TCP");
-  app.add_option("--laser", wire.laser, "obis or cobolt")->transform(CLI::CheckedTransformer(lasers, CLI::ignore_case));
+  app.add_flag("--table-serial", wire.is_table_serial,
+               "Modbus RTU on a pseudo-terminal instead of Modbus TCP");
+  app.add_option("--laser", wire.laser, "obis or cobolt")
+      ->transform(CLI::CheckedTransformer(lasers, CLI::ignore_case));
   app.add_flag("--laser-serial", wire.is_laser_serial, "a pseudo-terminal instead of a TCP port");
   app.add_option("--start-delay-s", wire.start_delay_s, "seconds from enabling the laser to its emission")
       ->check(CLI::Range(0., 600.))
@@ -118,7 +124,8 @@ int report_failure(const std::exception& error, ExitCode code) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"A simulated robot cell that speaks the protocols of its devices on TCP ports and pseudo-terminals."};
+  CLI::App app{
+      "A simulated robot cell that speaks the protocols of its devices on TCP ports and pseudo-terminals."};
   app.set_version_flag("--version", std::string("hilbrush-simcell ") + HILBRUSH_VERSION);
   Arguments arguments;
   add_flags(app, arguments);

@@ -72,7 +72,8 @@ int serve(const DaemonOptions& options) {
   if (std::uint64_t period_us = 0; ::sd_watchdog_enabled(0, &period_us) > 0)
     daemon.every(static_cast<double>(period_us) / 2e6, [] { ::sd_notify(0, "WATCHDOG=1"); });
   const std::string tcp = daemon.tcp_address().empty() ? "" : " and " + daemon.tcp_address();
-  spdlog::info("hilbrushd {} listens on {}{}; the cell is stopped", HILBRUSH_VERSION, options.socket.string(), tcp);
+  spdlog::info("hilbrushd {} listens on {}{}; the cell is stopped", HILBRUSH_VERSION, options.socket.string(),
+               tcp);
   ::sd_notify(0, "READY=1");
   daemon.run();
   disarm();
@@ -84,7 +85,8 @@ int serve(const DaemonOptions& options) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "The daemon of a robot cell that paints with light: takes jobs over a Unix socket, plans them, paints them."};
+      "The daemon of a robot cell that paints with light: takes jobs over a Unix socket, plans them, paints "
+      "them."};
   app.set_version_flag("--version", std::string("hilbrushd ") + HILBRUSH_VERSION);
   DaemonOptions options;
   options.socket = "/run/hilbrush/hilbrush.sock";
@@ -93,18 +95,21 @@ int main(int argc, char** argv) {
   std::string level = "info";
   std::string settings;
   app.add_option("--socket", options.socket, "Unix socket to listen on (mode 0660)")->capture_default_str();
-  app.add_option("--state", options.state, "folder for jobs, their files and the audit log")->capture_default_str();
-  app.add_option("--settings", settings, "JSON file: who may connect, TCP (default: the socket's group may, no TCP)");
+  app.add_option("--state", options.state, "folder for jobs, their files and the audit log")
+      ->capture_default_str();
+  app.add_option("--settings", settings,
+                 "JSON file: who may connect, TCP (default: the socket's group may, no TCP)");
   app.add_option("--cell", options.cell, "cell file, or name of a shipped cell")->capture_default_str();
-  app.add_option(
-      "--time-scale", options.time_scale,
-      "wall seconds of one second of a simulated cell: 1 real time, 0 as fast as possible (default: the cell file's)");
+  app.add_option("--time-scale", options.time_scale,
+                 "wall seconds of one second of a simulated cell: 1 real time, 0 as fast as possible "
+                 "(default: the cell file's)");
   app.add_option("--pipeline", options.pipeline, "the program hilbrush-pipeline")->capture_default_str();
   app.add_option("--pipeline-silence-s", options.pipeline_silence_s,
                  "a pipeline that makes no progress for this long is killed")
       ->check(CLI::Range(0.1, 86400.))
       ->capture_default_str();
-  app.add_option("--pipeline-memory-mb", options.pipeline_memory_mb, "a pipeline that needs more memory is killed")
+  app.add_option("--pipeline-memory-mb", options.pipeline_memory_mb,
+                 "a pipeline that needs more memory is killed")
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str();
   app.add_option("--log-level", level, "debug, info, warn, error or off")
@@ -121,7 +126,8 @@ int main(int argc, char** argv) {
   ::signal(SIGPIPE, SIG_IGN);
   ::signal(SIGHUP, SIG_IGN);   // a terminal that is closed must not end a painting job
   ::umask(::umask(0) | 0027);  // jobs and the audit log are for the daemon's user and group only
-  ::signal(SIGXFSZ, SIG_IGN);  // a file that must not grow is an error of the write, and does not end the daemon
+  ::signal(SIGXFSZ,
+           SIG_IGN);  // a file that must not grow is an error of the write, and does not end the daemon
   raise_descriptor_limit();
   try {
     if (!settings.empty()) options.settings = hilbrush::load_daemon_settings(settings);

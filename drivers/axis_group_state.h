@@ -21,9 +21,9 @@ struct AxisLabel {
   std::string unit;         ///< "degrees"
 };
 
-/// What all groups of axes keep about themselves, and what they refuse because of it: the place in the life cycle, the
-/// fault, the last target and whether the axes are in position there. The group's mutex guards it: unless said
-/// otherwise, the caller holds that.
+/// What all groups of axes keep about themselves, and what they refuse because of it: the place in the life
+/// cycle, the fault, the last target and whether the axes are in position there. The group's mutex guards it:
+/// unless said otherwise, the caller holds that.
 template <std::size_t N>
 class AxisGroupState {
  public:
@@ -37,7 +37,7 @@ class AxisGroupState {
 
   DeviceState state = DeviceState::kDisconnected;  ///< never kMoving: see shown_state()
   std::string fault;                               ///< a sentence, if state is kFault
-  bool is_target_current = false;                  ///< false after a stop and a fault: the axes are not bound for it
+  bool is_target_current = false;  ///< false after a stop and a fault: the axes are not bound for it
   bool is_in_position = false;
   double settle_s = 0;   ///< asked for with the target
   double arrival_s = 0;  ///< expected, on the cell's clock
@@ -60,9 +60,12 @@ class AxisGroupState {
     status.read_s = read_s;
     return status;
   }
-  double expected_arrival_s(double now_s) const { return is_under_way() ? std::max(now_s, arrival_s) : now_s; }
+  double expected_arrival_s(double now_s) const {
+    return is_under_way() ? std::max(now_s, arrival_s) : now_s;
+  }
 
-  /// Forgets the target. True if the fault is new: a group that is disconnected or in fault keeps what it had.
+  /// Forgets the target. True if the fault is new: a group that is disconnected or in fault keeps what it
+  /// had.
   bool set_fault(const std::string& sentence) {
     is_in_position = is_target_current = false;
     if (state == DeviceState::kFault || state == DeviceState::kDisconnected) return false;
@@ -94,11 +97,13 @@ class AxisGroupState {
       const AxisBounds& bounds = bounds_[i];
       if (target[i] >= bounds.min - kBoundsTolerance && target[i] <= bounds.max + kBoundsTolerance) continue;
       const auto text = [&](double value) { return number_text(value * labels_[i].units_per_si, 7); };
-      throw DriverError("the " + name_ + " refuses to move " + labels_[i].name + " to " + text(target[i]) + " " +
-                        labels_[i].unit + ": its limits are " + text(bounds.min) + " and " + text(bounds.max));
+      throw DriverError("the " + name_ + " refuses to move " + labels_[i].name + " to " + text(target[i]) +
+                        " " + labels_[i].unit + ": its limits are " + text(bounds.min) + " and " +
+                        text(bounds.max));
     }
   }
-  /// How long trapezoidal profiles within the bounds take for these distances (rad, m): a hint for those who wait.
+  /// How long trapezoidal profiles within the bounds take for these distances (rad, m): a hint for those who
+  /// wait.
   double travel_s(const std::array<double, N>& distances) const {
     double max_s = 0;
     for (std::size_t i = 0; i < N; ++i) {
@@ -106,7 +111,8 @@ class AxisGroupState {
       const double speed = bounds_[i].speed_max;
       const double rate = bounds_[i].acceleration_max;
       if (!(speed > 0) || !(rate > 0)) continue;
-      max_s = std::max(max_s, path * rate < speed * speed ? 2 * std::sqrt(path / rate) : path / speed + speed / rate);
+      max_s = std::max(
+          max_s, path * rate < speed * speed ? 2 * std::sqrt(path / rate) : path / speed + speed / rate);
     }
     return max_s;
   }

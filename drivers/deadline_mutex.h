@@ -5,8 +5,8 @@
 
 namespace hilbrush {
 
-/// A mutex that is waited for until a deadline, for std::unique_lock and std::lock_guard. std::timed_mutex does the
-/// same, but by a system call that thread sanitizers do not recognize.
+/// A mutex that is waited for until a deadline, for std::unique_lock and std::lock_guard. std::timed_mutex
+/// does the same, but by a system call that thread sanitizers do not recognize.
 class DeadlineMutex {
  public:
   void lock() {

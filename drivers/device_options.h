@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-/// What the drivers need to know of one cell's devices. Plain data; config/cell_devices.h reads it from cell files.
-/// Cell units: rad and m; device units are named.
+/// What the drivers need to know of one cell's devices. Plain data; config/cell_devices.h reads it from cell
+/// files. Cell units: rad and m; device units are named.
 namespace hilbrush {
 
 /// One axis as the cell means it and as the device counts it: device = sign * (si - offset) * steps_per_unit.
@@ -82,7 +82,8 @@ struct MappedRegister {
   bool is_signed = false;
   bool is_single_write = false;  ///< written by function 6 instead of 16 (one word only)
   double per_step = 1;           ///< register units of one step, step/s or step/s2
-  /// For registers that hold a time instead of a rate: the value is this, divided by what it would be otherwise.
+  /// For registers that hold a time instead of a rate: the value is this, divided by what it would be
+  /// otherwise.
   std::optional<double> inverse_of;
 };
 
@@ -105,8 +106,9 @@ struct RegisterMap {
   std::vector<RegisterTest> arrived;           ///< all of them: the drive says that its move is done
   std::vector<RegisterTest> homed;             ///< all of them: has its reference
   std::vector<RegisterStep> enable, disable, home, move, stop, clear_fault;
-  std::vector<RegisterStep> prepare;  ///< before `move`: writes that start nothing, and may go ahead while light is on
-  std::vector<RegisterStep> resume;   ///< before the first move after a stop
+  std::vector<RegisterStep>
+      prepare;  ///< before `move`: writes that start nothing, and may go ahead while light is on
+  std::vector<RegisterStep> resume;  ///< before the first move after a stop
 };
 
 struct LaserOptions {

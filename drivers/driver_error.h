@@ -3,8 +3,8 @@
 
 namespace hilbrush {
 
-/// The only exception drivers throw: a device that refuses, is late, is lost or contradicts itself. what() is a
-/// sentence for the operator.
+/// The only exception drivers throw: a device that refuses, is late, is lost or contradicts itself. what() is
+/// a sentence for the operator.
 struct DriverError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -13,8 +13,10 @@ using Characters = std::array<char, 340>;
 template <class... Format>
 std::string converted(Format... format) {
   Characters characters;
-  const auto [end, error] = std::to_chars(characters.data(), characters.data() + characters.size(), format...);
-  return error == std::errc() ? std::string(characters.data(), end) : std::string("a number too long to print");
+  const auto [end, error] =
+      std::to_chars(characters.data(), characters.data() + characters.size(), format...);
+  return error == std::errc() ? std::string(characters.data(), end)
+                              : std::string("a number too long to print");
 }
 
 }  // namespace

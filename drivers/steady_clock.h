@@ -10,8 +10,8 @@ namespace hilbrush {
 /// Time since construction on the machine's monotonic clock.
 class SteadyClock final : public Clock {
  public:
-  /// `scale`: wall seconds of one cell second. 1 on every real cell; device servers whose time runs faster need the
-  /// same scale on both sides. @pre scale > 0
+  /// `scale`: wall seconds of one cell second. 1 on every real cell; device servers whose time runs faster
+  /// need the same scale on both sides. @pre scale > 0
   explicit SteadyClock(double scale = 1) : scale_(scale) {}
 
   double now_s() const override;

@@ -15,8 +15,8 @@ namespace hilbrush {
 namespace {
 
 constexpr std::size_t kSkippedSample = 150, kReachedSample = 150;
-/// A trial must reach this share of the skipped dots, and gain this share of all dots: single missing dots are lost in
-/// the picture's own grain, and are not worth another mounting.
+/// A trial must reach this share of the skipped dots, and gain this share of all dots: single missing dots
+/// are lost in the picture's own grain, and are not worth another mounting.
 constexpr double kMinHelped = .2;
 constexpr double kMinGain = .005;
 constexpr double kHeightFactors[] = {.5};
@@ -27,7 +27,8 @@ bool depends_on_mounting(const SkippedDot& skipped) {
 }
 
 /// `count` of `all`, evenly with a random start.
-std::vector<std::uint32_t> sample(const std::vector<std::uint32_t>& all, std::size_t count, std::mt19937_64& random) {
+std::vector<std::uint32_t> sample(const std::vector<std::uint32_t>& all, std::size_t count,
+                                  std::mt19937_64& random) {
   if (all.size() <= count) return all;
   const double stride = static_cast<double>(all.size()) / static_cast<double>(count);
   double at = stride * std::uniform_real_distribution<double>(0, 1)(random);
@@ -55,8 +56,8 @@ Sample choose_sample(const DotSequence& dots, const std::vector<SkippedDot>& ski
   return {sample(helpable, kSkippedSample, random), sample(reached, kReachedSample, random), helpable.size()};
 }
 
-/// From the present position of the object to that on the other axis: taken off the fixture, turned over, centered, and
-/// mounted as before.
+/// From the present position of the object to that on the other axis: taken off the fixture, turned over,
+/// centered, and mounted as before.
 Eigen::Isometry3d lay_over(const TexturedMesh& mesh, const Standing& standing) {
   using Eigen::AngleAxisd, Eigen::Translation3d, Eigen::Vector3d;
   const auto& offset = standing.mounting.offset_m;
@@ -80,7 +81,8 @@ double share_reached(const Reach& reach, const DotSequence& dots, const std::vec
     const Eigen::Vector3d normal = moved.linear() * dot.normal_O.cast<double>().normalized();
     is_reached[i] = reach.find_pose_quickly({moved * dot.position_O, normal, normal}, reference).has_value();
   });
-  return static_cast<double>(std::count(is_reached.begin(), is_reached.end(), 1)) / static_cast<double>(indices.size());
+  return static_cast<double>(std::count(is_reached.begin(), is_reached.end(), 1)) /
+         static_cast<double>(indices.size());
 }
 
 }  // namespace
@@ -91,12 +93,13 @@ std::optional<MountingAdvice> advise_mounting(const TexturedMesh& mesh, const Ce
                                               std::uint64_t seed) {
   const Sample chosen = choose_sample(dots, skipped, seed);
   const auto count = static_cast<double>(dots.dots.size());
-  if (static_cast<double>(chosen.skipped_count) < kMinGain * count || chosen.skipped.empty()) return std::nullopt;
+  if (static_cast<double>(chosen.skipped_count) < kMinGain * count || chosen.skipped.empty())
+    return std::nullopt;
 
   const double now = 1 - static_cast<double>(skipped.size()) / count;
   std::optional<MountingAdvice> best;
-  const auto consider = [&](MountingAdvice advice, const TexturedMesh& trial_mesh, const CellDescription& trial_cell,
-                            const Eigen::Isometry3d& moved) {
+  const auto consider = [&](MountingAdvice advice, const TexturedMesh& trial_mesh,
+                            const CellDescription& trial_cell, const Eigen::Isometry3d& moved) {
     const Reach reach(trial_mesh, trial_cell, options);
     const double helped = share_reached(reach, dots, chosen.skipped, moved);
     if (helped < kMinHelped) return;
@@ -135,8 +138,8 @@ std::string advice_sentence(const MountingAdvice& advice) {
     const char* const axis = advice.up == UpAxis::kY ? "y" : "z";
     change = fmt::format("the object standing on its {0} axis (--up {0})", axis);
   }
-  return fmt::format("{} would reach about {:.1f} % of the dots instead of {:.1f} %", change, 100 * advice.reached_then,
-                     100 * advice.reached_now);
+  return fmt::format("{} would reach about {:.1f} % of the dots instead of {:.1f} %", change,
+                     100 * advice.reached_then, 100 * advice.reached_now);
 }
 
 }  // namespace hilbrush

@@ -27,8 +27,9 @@ struct Standing {
   UpAxis up = UpAxis::kZ;
 };
 
-/// Tries a few other post heights and the other up axis on a seeded sample of the skipped dots and of the others.
-/// Nothing if no skipped dot could be helped by that, or no trial gains enough to be worth another mounting.
+/// Tries a few other post heights and the other up axis on a seeded sample of the skipped dots and of the
+/// others. Nothing if no skipped dot could be helped by that, or no trial gains enough to be worth another
+/// mounting.
 /// @param mesh, cell  as planned with: mounted, and with the job's fixture.
 /// Cost: a Reach a trial and some 100 us for each of 300 dots.
 std::optional<MountingAdvice> advise_mounting(const TexturedMesh& mesh, const CellDescription& cell,

@@ -25,7 +25,8 @@ std::vector<std::uint32_t> dots_with_energy(const CellDescription& cell, const D
     if (result.dose)
       indices.push_back(i);
     else
-      skipped.push_back({i, SkipReason::kEnergy, std::move(result.refusal), "the laser cannot deliver the energy"});
+      skipped.push_back(
+          {i, SkipReason::kEnergy, std::move(result.refusal), "the laser cannot deliver the energy"});
   }
   return indices;
 }

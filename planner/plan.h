@@ -10,8 +10,9 @@
 #include "sampling/dots/dots.h"
 
 /// Dots to program, the entry of planner/:
-///   pose_search (shared beam directions, stations, unserved dots with reach's reasons, ordering, yaw) or follow_normal
-///   (the baseline) -> program_builder (clear paths between poses: transit; dose) -> program_time.
+///   pose_search (shared beam directions, stations, unserved dots with reach's reasons, ordering, yaw) or
+///   follow_normal (the baseline) -> program_builder (clear paths between poses: transit; dose) ->
+///   program_time.
 namespace hilbrush {
 
 struct Plan {
@@ -23,8 +24,8 @@ struct Plan {
 /// Cost: O(dots), memory O(dots).
 Plan plan_exposures(const Reach& reach, const DotSequence& dots, const Progress& progress = {});
 
-/// The checked path from measured joints to exposure `next` of the program: way-points, possibly none (the direct move
-/// is clear).
+/// The checked path from measured joints to exposure `next` of the program: way-points, possibly none (the
+/// direct move is clear).
 /// @throws InputError if there is no clear path.
 std::vector<Joints> plan_approach(const Reach& reach, const ExposureProgram& program, std::size_t next,
                                   const Joints& from);

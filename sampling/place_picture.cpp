@@ -13,7 +13,8 @@ namespace hilbrush {
 namespace {
 
 /// The field that decides the number of dots, if it differs from that of the energy.
-std::optional<ToneField> density_field(const ToneField& tone, ToneOptions options, const std::vector<double>& levels) {
+std::optional<ToneField> density_field(const ToneField& tone, ToneOptions options,
+                                       const std::vector<double>& levels) {
   if (levels == std::vector<double>{1}) return std::nullopt;
   options.curve = density_curve(options.curve, levels);
   return std::optional<ToneField>(std::in_place, tone.mesh(), options);
@@ -33,8 +34,8 @@ std::vector<std::uint64_t> count_levels(const DotSequence& dots, const std::vect
 }  // namespace
 
 DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, const ToneOptions& tone_options,
-                          const PictureOptions& options, const PicturePredictor& predict, PictureReport* report,
-                          const Progress& progress) {
+                          const PictureOptions& options, const PicturePredictor& predict,
+                          PictureReport* report, const Progress& progress) {
   PictureReport figures;
   SampleOptions sample = options.sample;
   const bool is_fine = sample.sampler == Sampler::kFine;
@@ -55,13 +56,14 @@ DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, cons
   };
   const std::optional<ToneField> density = density_field(tone, tone_options, options.levels);
   const PredictiveOptions predictive{.rounds = options.predictive_rounds, .levels = options.levels};
-  DotSequence dots = place_predictively(tone, density ? *density : tone, tone_options.curve, predictive, place, predict,
-                                        &figures.predictive);
+  DotSequence dots = place_predictively(tone, density ? *density : tone, tone_options.curve, predictive,
+                                        place, predict, &figures.predictive);
   if (is_fine && !dots.dots.empty()) {
     const SpotModel spot = options.spot(dots.pitch_m);
     dots = refine_dots(curve, tone, std::move(dots), spot, {.passes = options.fine_passes}, next_part());
   }
-  // Since they were placed, filling holes has added dots, and the predictive loop and the search have moved some.
+  // Since they were placed, filling holes has added dots, and the predictive loop and the search have moved
+  // some.
   PathMeter meter(figures.path);
   meter.follow(dots.dots);
   meter.finish();

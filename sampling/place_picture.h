@@ -9,9 +9,9 @@
 #include "sampling/gaps/fill_holes.h"
 #include "sampling/predictive/predictive_loop.h"
 
-/// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels of
-/// energy, the predictive loop, the search on the finished dots. place_dots() and the others do one thing each; this
-/// combines them in the only useful order:
+/// From a picture on a surface to dots, with everything that an operator may choose: curve, placement, levels
+/// of energy, the predictive loop, the search on the finished dots. place_dots() and the others do one thing
+/// each; this combines them in the only useful order:
 ///   place by density -> fill holes -> levels -> (predict the picture and place again: predictive_loop.h)
 ///   -> fine (fine.h)
 namespace hilbrush {
@@ -33,8 +33,9 @@ struct PictureReport {
   std::vector<std::uint64_t> dots_of_level;  ///< one element for each level
 };
 
-/// `tone` is the asked tone, made with `tone_options` on the mesh of `curve`. `predict` is called only if there are
-/// predictive rounds. Laminar slices use only the mesh of `curve`. Deterministic. @throws InputError as place_dots().
+/// `tone` is the asked tone, made with `tone_options` on the mesh of `curve`. `predict` is called only if
+/// there are predictive rounds. Laminar slices use only the mesh of `curve`. Deterministic. @throws
+/// InputError as place_dots().
 DotSequence place_picture(const SurfaceCurve& curve, const ToneField& tone, const ToneOptions& tone_options,
                           const PictureOptions& options, const PicturePredictor& predict,
                           PictureReport* report = nullptr, const Progress& progress = {});

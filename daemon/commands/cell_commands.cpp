@@ -14,7 +14,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Clearing, arming and homing are answered when they are done: long enough for a laser's start delay and a slow axis.
+/// Clearing, arming and homing are answered when they are done: long enough for a laser's start delay and a
+/// slow axis.
 constexpr auto kMotionTimeout = std::chrono::seconds(120);
 constexpr auto kAnswerTimeout = std::chrono::seconds(10);
 
@@ -30,7 +31,8 @@ int call_daemon(const CommandContext& context, const CellCommand& command) {
   if (context.is_json)
     context.terminal.out << result.dump() << std::endl;
   else if (method == "system.info")
-    context.terminal.out << format_fields(member(result, "system").is_object() ? member(result, "system") : result)
+    context.terminal.out << format_fields(member(result, "system").is_object() ? member(result, "system")
+                                                                               : result)
                          << std::flush;
   else if (method == "cell.status")
     context.terminal.out << format_cell(member(result, "cell")) << std::flush;
@@ -47,9 +49,11 @@ void add_cell_commands(CLI::App& app, CommandContext& context) {
       CellCommand{"stop", "cell.stop", "turn the laser off and stop all motion at once; stays so until clear",
                   kAnswerTimeout},
       CellCommand{"clear", "cell.clear", "clear a stop or a fault whose cause is gone", kMotionTimeout},
-      CellCommand{"arm", "cell.arm", "make the cell ready to paint: enable the devices, arm the laser", kMotionTimeout},
+      CellCommand{"arm", "cell.arm", "make the cell ready to paint: enable the devices, arm the laser",
+                  kMotionTimeout},
       CellCommand{"home", "cell.home", "move all axes to their home positions, laser off", kMotionTimeout},
-      CellCommand{"info", "system.info", "show the daemon's version, cell, folders and limits", kAnswerTimeout},
+      CellCommand{"info", "system.info", "show the daemon's version, cell, folders and limits",
+                  kAnswerTimeout},
   };
   for (const CellCommand& entry : kCommands) {
     CLI::App* command = add_daemon_command(app, context, entry.name, entry.description);

@@ -8,8 +8,8 @@ namespace CLI {
 class App;
 }
 
-/// What all commands of `hilbrush` share. A command declares its flags on a CLI::App; if the user gives that command,
-/// parsing sets `action` to its work.
+/// What all commands of `hilbrush` share. A command declares its flags on a CLI::App; if the user gives that
+/// command, parsing sets `action` to its work.
 namespace hilbrush {
 
 struct CommandContext {
@@ -20,7 +20,8 @@ struct CommandContext {
 };
 
 /// A subcommand with --json, --help and --version.
-CLI::App* add_command(CLI::App& app, CommandContext& context, const std::string& name, const std::string& description);
+CLI::App* add_command(CLI::App& app, CommandContext& context, const std::string& name,
+                      const std::string& description);
 /// The same with --socket.
 CLI::App* add_daemon_command(CLI::App& app, CommandContext& context, const std::string& name,
                              const std::string& description);

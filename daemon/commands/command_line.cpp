@@ -22,8 +22,10 @@ namespace hilbrush {
 namespace {
 
 constexpr const char* kFooter =
-    "Exit codes: 0 done; 1 internal failure; 2 wrong usage; 3 bad input (model, settings, cell, program, job);\n"
-    "4 no daemon answers or the connection was lost; 5 refused in this state; 6 the job failed or was cancelled, or\n"
+    "Exit codes: 0 done; 1 internal failure; 2 wrong usage; 3 bad input (model, settings, cell, program, "
+    "job);\n"
+    "4 no daemon answers or the connection was lost; 5 refused in this state; 6 the job failed or was "
+    "cancelled, or\n"
     "none of its dots can be exposed; 130 interrupted.";
 
 std::string default_socket() {
@@ -47,11 +49,14 @@ int exit_code_of(int rpc_error) {
 }
 
 /// Prints the sentence on standard error; with --json also as an object on standard output.
-int report_failure(const CommandContext& context, int exit_code, const std::string& at, const std::string& sentence) {
-  context.terminal.err << "hilbrush: " << printable(at.empty() ? sentence : at + ": " + sentence) << std::endl;
+int report_failure(const CommandContext& context, int exit_code, const std::string& at,
+                   const std::string& sentence) {
+  context.terminal.err << "hilbrush: " << printable(at.empty() ? sentence : at + ": " + sentence)
+                       << std::endl;
   if (context.is_json) {
     const nlohmann::ordered_json error{{"error", {{"code", exit_code}, {"message", sentence}, {"at", at}}}};
-    context.terminal.out << error.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << std::endl;
+    context.terminal.out << error.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
+                         << std::endl;
   }
   return exit_code;
 }
@@ -60,7 +65,8 @@ int report_failure(const CommandContext& context, int exit_code, const std::stri
 void quote_child(const CommandContext& context, const std::string& child_stderr) {
   for (std::size_t start = 0; start < child_stderr.size();) {
     const std::size_t end = std::min(child_stderr.find('\n', start), child_stderr.size());
-    if (end > start) context.terminal.err << "  | " << printable(child_stderr.substr(start, end - start)) << '\n';
+    if (end > start)
+      context.terminal.err << "  | " << printable(child_stderr.substr(start, end - start)) << '\n';
     start = end + 1;
   }
 }
@@ -91,7 +97,8 @@ int run_action(const CommandContext& context) {
 
 }  // namespace
 
-CLI::App* add_command(CLI::App& app, CommandContext& context, const std::string& name, const std::string& description) {
+CLI::App* add_command(CLI::App& app, CommandContext& context, const std::string& name,
+                      const std::string& description) {
   CLI::App* command = app.add_subcommand(name, description);
   command->add_flag("--json", context.is_json, "print the exact result as JSON");
   command->set_version_flag("--version", "hilbrush " HILBRUSH_VERSION);
@@ -127,7 +134,8 @@ std::optional<std::string> nearest_argument(const std::string& word, const std::
   return words[static_cast<std::size_t>(std::find(keys.begin(), keys.end(), *nearest) - keys.begin())];
 }
 
-/// For the first argument that is not understood, what was probably meant: "no command foo; did you mean ...?".
+/// For the first argument that is not understood, what was probably meant: "no command foo; did you mean
+/// ...?".
 std::string unknown_argument_sentence(const CLI::App& app) {
   const std::vector<std::string> unknown = app.remaining(true);
   if (unknown.empty()) return {};

@@ -4,8 +4,8 @@
 
 #include "daemon/commands/terminal.h"
 
-/// The operator's command `hilbrush`, without its main(): parses the arguments, runs one command, reports errors as
-/// sentences.
+/// The operator's command `hilbrush`, without its main(): parses the arguments, runs one command, reports
+/// errors as sentences.
 ///   settings_flags                               flags to settings of a job
 ///   pipeline_commands, quality_command, pipeline_run   work on a mesh, in a child process
 ///   job_commands, cell_commands, watch, rpc_client     requests to the daemon

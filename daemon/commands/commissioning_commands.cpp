@@ -46,11 +46,12 @@ void check_axes(AxisGroup<N>& axes, std::size_t first, const CellDescription& ce
   for (std::size_t i = 0; i < N; ++i) {
     const std::size_t axis = first + i;
     const AxisDescription& limits = cell.axes[axis];
-    const std::string at = std::string(kAxisNames[axis]) + " is at " + position_text(axis, status.positions[i]);
+    const std::string at =
+        std::string(kAxisNames[axis]) + " is at " + position_text(axis, status.positions[i]);
     finding.found.push_back(at);
     if (!(status.positions[i] >= limits.min && status.positions[i] <= limits.max))
-      finding.problems.push_back(at + ", outside the cell file's limits " + position_text(axis, limits.min) + " to " +
-                                 position_text(axis, limits.max) + ": wrong sign, offset or scale?");
+      finding.problems.push_back(at + ", outside the cell file's limits " + position_text(axis, limits.min) +
+                                 " to " + position_text(axis, limits.max) + ": wrong sign, offset or scale?");
   }
 }
 
@@ -63,16 +64,18 @@ void check_laser(CellDevices& devices, const CellDescription& cell, Finding& fin
   constexpr double kRounding = 1e-6;  // as a share; devices report their limits as decimal text
   if (wanted.power_min_w < device.power_min_w * (1 - kRounding) ||
       wanted.power_max_w > device.power_max_w * (1 + kRounding))
-    finding.problems.push_back(fmt::format(
-        "the cell file says {:.4g} to {:.4g} mW, the laser can do {:.4g} to {:.4g} mW", wanted.power_min_w * 1e3,
-        wanted.power_max_w * 1e3, device.power_min_w * 1e3, device.power_max_w * 1e3));
+    finding.problems.push_back(
+        fmt::format("the cell file says {:.4g} to {:.4g} mW, the laser can do {:.4g} to {:.4g} mW",
+                    wanted.power_min_w * 1e3, wanted.power_max_w * 1e3, device.power_min_w * 1e3,
+                    device.power_max_w * 1e3));
   const Laser::Status status = laser.status();
   if (!status.interlock_closed) finding.problems.push_back("the interlock is open, or the key is out");
   if (status.state == DeviceState::kFault) finding.problems.push_back(status.fault);
   laser.disable();
 }
 
-Finding check_device(const char* device, const std::string& driver, const std::function<void(Finding&)>& check) {
+Finding check_device(const char* device, const std::string& driver,
+                     const std::function<void(Finding&)>& check) {
   Finding finding{device, driver, {}, {}};
   if (driver == "simulated") return finding;
   try {
@@ -95,8 +98,8 @@ std::vector<Finding> check_devices(CellDevices& devices, const DriverNames& driv
     check_axes<2>(
         cell.table, kTilt, description, [&] { return devices.identify_table(); }, finding);
   }));
-  findings.push_back(
-      check_device("laser", drivers.laser, [&](Finding& finding) { check_laser(devices, description, finding); }));
+  findings.push_back(check_device("laser", drivers.laser,
+                                  [&](Finding& finding) { check_laser(devices, description, finding); }));
   return findings;
 }
 
@@ -109,7 +112,9 @@ void print(const CommandContext& context, const CellDescription& cell, const std
                                  {"fit", finding.problems.empty()},
                                  {"found", finding.found},
                                  {"problems", finding.problems}};
-    out << Json{{"cell", cell.name}, {"devices", devices}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
+    out << Json{{"cell", cell.name}, {"devices", devices}}.dump(-1, ' ', false,
+                                                                Json::error_handler_t::replace)
+        << '\n';
     return;
   }
   for (const Finding& finding : findings) {
@@ -129,8 +134,8 @@ int check_cell(const CommandContext& context, const std::string& name) {
   const auto devices = make_cell_devices(description, options, file);
   const std::vector<Finding> findings = check_devices(*devices, driver_names(options), description);
   print(context, description, findings);
-  const bool is_fit =
-      std::all_of(findings.begin(), findings.end(), [](const Finding& finding) { return finding.problems.empty(); });
+  const bool is_fit = std::all_of(findings.begin(), findings.end(),
+                                  [](const Finding& finding) { return finding.problems.empty(); });
   return is_fit ? kExitOk : kExitRefused;
 }
 
@@ -172,9 +177,9 @@ std::size_t axis_index(const std::string& name) {
 double step_of(const JogFlags& flags, std::size_t axis) {
   const bool is_linear = axis == kJ3;
   if (is_linear != flags.by_mm.has_value() || is_linear == flags.by_deg.has_value())
-    throw InputError(
-        is_linear ? "--by-mm" : "--by-deg",
-        "axis " + flags.axis + " moves by " + (is_linear ? "millimeters" : "degrees") + ": give this flag only");
+    throw InputError(is_linear ? "--by-mm" : "--by-deg", "axis " + flags.axis + " moves by " +
+                                                             (is_linear ? "millimeters" : "degrees") +
+                                                             ": give this flag only");
   const double step = is_linear ? *flags.by_mm : *flags.by_deg;
   const double limit = is_linear ? kMaxStepMm : kMaxStepDeg;
   if (!(std::abs(step) <= limit) || step == 0)
@@ -193,8 +198,8 @@ bool is_move_confirmed(const CommandContext& context, const JogFlags& flags, con
   return answer == "y" || answer == "yes";
 }
 
-/// Waits for the end of the move, disables the axes and returns the position reached; `index`: of the axis in its
-/// group. @throws DriverError, Interrupted
+/// Waits for the end of the move, disables the axes and returns the position reached; `index`: of the axis in
+/// its group. @throws DriverError, Interrupted
 template <std::size_t N>
 double finish_move(AxisGroup<N>& axes, std::size_t index, Clock& clock, InterruptWatch& interrupt) {
   const double deadline_s = clock.now_s() + kMoveTimeoutS;
@@ -216,8 +221,8 @@ double finish_move(AxisGroup<N>& axes, std::size_t index, Clock& clock, Interrup
 
 /// `index`: of the axis in its group.
 template <std::size_t N>
-int jog_axes(const CommandContext& context, const JogFlags& flags, AxisGroup<N>& axes, std::size_t index, double step,
-             Clock& clock, InterruptWatch& interrupt) {
+int jog_axes(const CommandContext& context, const JogFlags& flags, AxisGroup<N>& axes, std::size_t index,
+             double step, Clock& clock, InterruptWatch& interrupt) {
   const std::size_t axis = axis_index(flags.axis);
   axes.connect();
   auto target = axes.status().positions;
@@ -225,7 +230,8 @@ int jog_axes(const CommandContext& context, const JogFlags& flags, AxisGroup<N>&
   target[index] += step;
   if (!is_move_confirmed(context, flags,
                          "Move " + flags.axis + " from " + position_text(axis, from) + " to " +
-                             position_text(axis, target[index]) + ", slowly, the laser off. Is the cell clear?")) {
+                             position_text(axis, target[index]) +
+                             ", slowly, the laser off. Is the cell clear?")) {
     context.terminal.err << "hilbrush: nothing was moved; answer y, or give --yes\n";
     return kExitRefused;
   }
@@ -235,8 +241,8 @@ int jog_axes(const CommandContext& context, const JogFlags& flags, AxisGroup<N>&
   const double to = finish_move(axes, index, clock, interrupt);
   const auto in_mm_or_deg = [axis](double value) { return axis == kJ3 ? value * 1e3 : value / kDegree; };
   if (context.is_json)
-    context.terminal.out << Json{{"axis", flags.axis}, {"from", in_mm_or_deg(from)}, {"to", in_mm_or_deg(to)}}.dump()
-                         << '\n';
+    context.terminal.out
+        << Json{{"axis", flags.axis}, {"from", in_mm_or_deg(from)}, {"to", in_mm_or_deg(to)}}.dump() << '\n';
   else
     context.terminal.out << flags.axis << " is at " << position_text(axis, to) << '\n';
   return kExitOk;
@@ -260,10 +266,12 @@ int jog(const CommandContext& context, const JogFlags& flags) {
 
 void add_commissioning_commands(CLI::App& app, CommandContext& context) {
   auto name = std::make_shared<std::string>("default");
-  CLI::App* check = add_command(app, context, "check-cell",
-                                "connect to a cell's devices and check them against the cell file; moves nothing");
+  CLI::App* check =
+      add_command(app, context, "check-cell",
+                  "connect to a cell's devices and check them against the cell file; moves nothing");
   check->add_option("CELL", *name, "name of a cell, or its file")->capture_default_str();
-  check->callback([&context, name] { context.action = [&context, name] { return check_cell(context, *name); }; });
+  check->callback(
+      [&context, name] { context.action = [&context, name] { return check_cell(context, *name); }; });
 
   auto flags = std::make_shared<JogFlags>();
   CLI::App* command =
@@ -275,7 +283,8 @@ void add_commissioning_commands(CLI::App& app, CommandContext& context) {
   command->add_option("--by-mm", flags->by_mm, "step of j3, at most 20 mm");
   command->add_option("--cell", flags->cell, "name of a cell, or its file")->capture_default_str();
   command->add_flag("--yes", flags->is_confirmed, "do not ask for confirmation");
-  command->callback([&context, flags] { context.action = [&context, flags] { return jog(context, *flags); }; });
+  command->callback(
+      [&context, flags] { context.action = [&context, flags] { return jog(context, *flags); }; });
 }
 
 }  // namespace hilbrush

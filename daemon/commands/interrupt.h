@@ -3,8 +3,8 @@
 /// Ctrl-C and SIGTERM as a descriptor, so that a command can clean up before it ends.
 namespace hilbrush {
 
-/// While such an object exists, both signals only make descriptor() readable. Create it before any thread is started;
-/// only one at a time.
+/// While such an object exists, both signals only make descriptor() readable. Create it before any thread is
+/// started; only one at a time.
 class InterruptWatch {
  public:
   InterruptWatch();

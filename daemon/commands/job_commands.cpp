@@ -79,7 +79,8 @@ int list(const CommandContext& context, const JobFlags& flags) {
   if (context.is_json)
     context.terminal.out << result.dump() << std::endl;
   else
-    context.terminal.out << format_job_table(result.is_array() ? result : member(result, "jobs")) << std::flush;
+    context.terminal.out << format_job_table(result.is_array() ? result : member(result, "jobs"))
+                         << std::flush;
   return kExitOk;
 }
 
@@ -89,7 +90,8 @@ Json params_of(const JobFlags& flags) {
 
 int move(const CommandContext& context, const JobFlags& flags) {
   RpcClient client(context.socket_path);
-  return print_job(context, client.call("job.move", Json{{"id", flags.id}, {"position", flags.position}}), false);
+  return print_job(context, client.call("job.move", Json{{"id", flags.id}, {"position", flags.position}}),
+                   false);
 }
 
 /// On a terminal; elsewhere nothing is asked, and the answer is no.
@@ -103,10 +105,12 @@ bool is_confirmed(const CommandContext& context, const std::string& question) {
 
 /// Only the operator can see whether the part is there: a flag, or a question on a terminal.
 bool is_part_in_place(const CommandContext& context, const JobFlags& flags) {
-  return flags.part_in_place || is_confirmed(context, "Is the part of job " + printable(flags.id) + " in place?");
+  return flags.part_in_place ||
+         is_confirmed(context, "Is the part of job " + printable(flags.id) + " in place?");
 }
 
-/// What was planned with warnings, such as a texture that is missing, spoils a part: the operator accepts them first.
+/// What was planned with warnings, such as a texture that is missing, spoils a part: the operator accepts
+/// them first.
 bool are_warnings_accepted(const CommandContext& context, const JobFlags& flags, const Json& job) {
   const std::string warnings = format_warnings(job);
   context.terminal.err << warnings << format_plan(job) << std::flush;
@@ -147,13 +151,14 @@ int get(const CommandContext& context, const JobFlags& flags) {
   return print_job(context, client.call("job.get", params_of(flags)), true);
 }
 
-/// Painting ends between two dots, a moment after it was asked to: the answer waits for it, so that it is the new
-/// state.
+/// Painting ends between two dots, a moment after it was asked to: the answer waits for it, so that it is the
+/// new state.
 Json state_after_painting(RpcClient& client, const JobFlags& flags, Json result) {
   constexpr auto kPatience = std::chrono::seconds(30);  // a retract, a pulse and a settling take less
   constexpr auto kPause = std::chrono::milliseconds(50);
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (text_field(member(result, "job"), "state") == "painting" && std::chrono::steady_clock::now() < deadline) {
+  while (text_field(member(result, "job"), "state") == "painting" &&
+         std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(kPause);
     result = client.call("job.get", params_of(flags));
   }
@@ -162,7 +167,8 @@ Json state_after_painting(RpcClient& client, const JobFlags& flags, Json result)
 
 int pause(const CommandContext& context, const JobFlags& flags) {
   RpcClient client(context.socket_path);
-  return print_job(context, state_after_painting(client, flags, client.call("job.pause", params_of(flags))), false);
+  return print_job(context, state_after_painting(client, flags, client.call("job.pause", params_of(flags))),
+                   false);
 }
 
 /// Of a part that is painted in part nothing can be saved: a terminal asks first.
@@ -172,14 +178,16 @@ int cancel(const CommandContext& context, const JobFlags& flags) {
     const Json job = member(client.call("job.get", params_of(flags)), "job");
     const std::string state = text_field(job, "state");
     const bool is_begun = state == "painting" || state == "paused";
-    const std::string question = format_job_line(job) + "\nCancelling is final: the part cannot be painted on, as it " +
+    const std::string question = format_job_line(job) +
+                                 "\nCancelling is final: the part cannot be painted on, as it " +
                                  "can after `hilbrush pause`. Cancel?";
     if (is_begun && !is_confirmed(context, question)) {
       context.terminal.err << "hilbrush: not cancelled\n";
       return kExitRefused;
     }
   }
-  return print_job(context, state_after_painting(client, flags, client.call("job.cancel", params_of(flags))), false);
+  return print_job(context, state_after_painting(client, flags, client.call("job.cancel", params_of(flags))),
+                   false);
 }
 
 using Action = std::function<int(CommandContext&, const JobFlags&)>;
@@ -189,7 +197,8 @@ struct Declared {
   std::shared_ptr<JobFlags> flags;
 };
 
-Declared declare(CLI::App& app, CommandContext& context, const char* name, const char* description, Action action) {
+Declared declare(CLI::App& app, CommandContext& context, const char* name, const char* description,
+                 Action action) {
   auto flags = std::make_shared<JobFlags>();
   CLI::App* command = add_daemon_command(app, context, name, description);
   command->callback([&context, flags, action = std::move(action)] {
@@ -206,24 +215,28 @@ Declared declare_with_id(CLI::App& app, CommandContext& context, const char* nam
 }
 
 void add_submit(CLI::App& app, CommandContext& context) {
-  const Declared command =
-      declare(app, context, "submit", "send a model to the daemon, which plans it at once; start paints it", submit);
+  const Declared command = declare(
+      app, context, "submit", "send a model to the daemon, which plans it at once; start paints it", submit);
   command.app->add_option("MODEL", command.flags->model, "VRML, OBJ, PLY, OFF or STL file")->required();
-  command.app->add_flag("--dry-run", command.flags->dry_run, "paint on a simulated cell of its own, without start");
-  command.app->add_option("--key", command.flags->key, "submitting again with the same key finds the same job");
-  command.app->add_option("--copies", command.flags->copies, "paint this many parts, one after another (default 1)")
+  command.app->add_flag("--dry-run", command.flags->dry_run,
+                        "paint on a simulated cell of its own, without start");
+  command.app->add_option("--key", command.flags->key,
+                          "submitting again with the same key finds the same job");
+  command.app
+      ->add_option("--copies", command.flags->copies, "paint this many parts, one after another (default 1)")
       ->check(CLI::Range(1, 1000));
   command.flags->settings.add_to(*command.app);
 }
 
 void add_watch(CLI::App& app, CommandContext& context) {
-  const Declared command =
-      declare_with_id(app, context, "watch", "follow a job until it ends",
-                      [](CommandContext& c, const JobFlags& flags) { return watch_job(c, flags.id, flags.until); });
+  const Declared command = declare_with_id(
+      app, context, "watch", "follow a job until it ends",
+      [](CommandContext& c, const JobFlags& flags) { return watch_job(c, flags.id, flags.until); });
   command.app
-      ->add_option("--until", command.flags->until,
-                   "stop watching in this state: planning, ready, painting, paused or done (default); part: when this "
-                   "part of a job of several copies is painted")
+      ->add_option(
+          "--until", command.flags->until,
+          "stop watching in this state: planning, ready, painting, paused or done (default); part: when this "
+          "part of a job of several copies is painted")
       ->check(CLI::IsMember({"planning", "ready", "painting", "paused", "part", "done"}));
 }
 
@@ -237,7 +250,8 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
   list_command.app->add_flag("--queue", list_command.flags->is_queue,
                              "only the waiting jobs, in the order of the queue");
   declare_with_id(app, context, "get", "show everything about one job", get);
-  const Declared start_command = declare_with_id(app, context, "start", "start painting a job that is ready", start);
+  const Declared start_command =
+      declare_with_id(app, context, "start", "start painting a job that is ready", start);
   start_command.app->add_flag("--part-in-place", start_command.flags->part_in_place,
                               "confirms that the part is on the table (without it a terminal asks)");
   start_command.app->add_flag("--accept-warnings", start_command.flags->accept_warnings,
@@ -248,15 +262,17 @@ void add_job_commands(CLI::App& app, CommandContext& context) {
       ->add_option("--in-doubt", resume_command.flags->in_doubt,
                    "dots that may have been exposed already: leave or expose")
       ->check(CLI::IsMember({"leave", "expose"}));
-  resume_command.app->add_flag("--part-in-place", resume_command.flags->part_in_place,
-                               "confirms that the part is where it was (without it a terminal asks if necessary)");
+  resume_command.app->add_flag(
+      "--part-in-place", resume_command.flags->part_in_place,
+      "confirms that the part is where it was (without it a terminal asks if necessary)");
   const Declared move_command =
       declare_with_id(app, context, "move", "move a waiting job to another position in the queue", move);
   move_command.app->add_option("POSITION", move_command.flags->position, "1: the next to be painted")
       ->required()
       ->check(CLI::Range(1, 1'000'000));
-  const Declared cancel_command = declare_with_id(
-      app, context, "cancel", "cancel a job for good; its remaining dots are not painted (see pause)", cancel);
+  const Declared cancel_command =
+      declare_with_id(app, context, "cancel",
+                      "cancel a job for good; its remaining dots are not painted (see pause)", cancel);
   cancel_command.app->add_flag("--yes", cancel_command.flags->yes,
                                "do not ask, even if the job is being painted (without it a terminal asks)");
 }

@@ -35,7 +35,8 @@ struct PipelineFlags {
 std::string stage_text(const std::string& stage, double fraction) {
   std::string text = stage + " " + std::to_string(static_cast<int>(100 * fraction)) + " %";
   if (const auto found = std::find(kStages.begin(), kStages.end(), stage); found != kStages.end())
-    text += " (stage " + std::to_string(found - kStages.begin() + 1) + " of " + std::to_string(kStages.size()) + ")";
+    text += " (stage " + std::to_string(found - kStages.begin() + 1) + " of " +
+            std::to_string(kStages.size()) + ")";
   return text;
 }
 
@@ -61,10 +62,15 @@ void print_files(std::ostream& out, const fs::path& output) {
   struct Line {
     const char *label, *file;
   };
-  constexpr std::array kLines{
-      Line{"report", "report.json"},  Line{"pictures", "exposure.png"},   Line{"views", "views"},
-      Line{"program", "program.ply"}, Line{"dots", "dots.ply"},           Line{"tone curve", "tone_curve.json"},
-      Line{"wedge", "wedge.wrl"},     Line{"its settings", "wedge.json"}, Line{"its readings", "wedge_steps.json"}};
+  constexpr std::array kLines{Line{"report", "report.json"},
+                              Line{"pictures", "exposure.png"},
+                              Line{"views", "views"},
+                              Line{"program", "program.ply"},
+                              Line{"dots", "dots.ply"},
+                              Line{"tone curve", "tone_curve.json"},
+                              Line{"wedge", "wedge.wrl"},
+                              Line{"its settings", "wedge.json"},
+                              Line{"its readings", "wedge_steps.json"}};
   std::error_code error;
   for (const Line& line : kLines) {
     if (!fs::exists(output / line.file, error)) continue;
@@ -78,7 +84,8 @@ void print_files(std::ostream& out, const fs::path& output) {
 bool is_all_skipped(const Json& report) {
   const Json& dots = member(report, "dots");
   return number_field(dots, "placed") > 0 &&
-         number_field(dots, "exposed") + number_field(dots, "remaining") + number_field(dots, "in_doubt") == 0;
+         number_field(dots, "exposed") + number_field(dots, "remaining") + number_field(dots, "in_doubt") ==
+             0;
 }
 
 int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
@@ -93,7 +100,8 @@ int run_pipeline(CommandContext& context, const PipelineFlags& flags) {
     ProgressDisplay display(context.terminal, context.is_json);
     PipelineRunListener listener;
     listener.on_progress = [&](const std::string& stage, double fraction) {
-      display.show(stage, fraction, context.terminal.out_is_terminal ? stage_text(stage, fraction) : "stage: " + stage);
+      display.show(stage, fraction,
+                   context.terminal.out_is_terminal ? stage_text(stage, fraction) : "stage: " + stage);
     };
     listener.on_warning = [&](const std::string& sentence) { display.print_above("warning: " + sentence); };
     result = run_pipeline_program(find_pipeline_program(), arguments, listener);
@@ -116,7 +124,8 @@ struct DeclaredRun {
   std::shared_ptr<PipelineFlags> flags;
 };
 
-DeclaredRun declare(CLI::App& app, CommandContext& context, const std::string& name, const std::string& description) {
+DeclaredRun declare(CLI::App& app, CommandContext& context, const std::string& name,
+                    const std::string& description) {
   auto flags = std::make_shared<PipelineFlags>();
   flags->command = name;
   CLI::App* command = add_command(app, context, name, description);
@@ -136,7 +145,8 @@ void add_model(const DeclaredRun& declared) {
 void add_pipeline_commands(CLI::App& app, CommandContext& context) {
   add_model(declare(app, context, "dry-run",
                     "plan a model, paint it on the simulated cell and write pictures; needs no daemon"));
-  add_model(declare(app, context, "plan", "make the dots and the exposure program of a model, without painting"));
+  add_model(
+      declare(app, context, "plan", "make the dots and the exposure program of a model, without painting"));
 
   const DeclaredRun develop =
       declare(app, context, "develop", "write the pictures of a job that a simulated cell has painted");
@@ -145,15 +155,18 @@ void add_pipeline_commands(CLI::App& app, CommandContext& context) {
       ->add_option("--program", develop.flags->program,
                    "the program that was painted; settings default to those in the report.json beside it")
       ->required();
-  develop.app->add_option("--emissions", develop.flags->emissions, "the cell's record of emissions")->required();
+  develop.app->add_option("--emissions", develop.flags->emissions, "the cell's record of emissions")
+      ->required();
 
-  const DeclaredRun calibrate =
-      declare(app, context, "calibrate", "make a tone curve from a gray wedge, simulated or painted and measured");
-  auto* measured = calibrate.app->add_option("--measured", calibrate.flags->measured,
-                                             "the wedge_steps.json of a painted wedge, with the readings filled in");
+  const DeclaredRun calibrate = declare(
+      app, context, "calibrate", "make a tone curve from a gray wedge, simulated or painted and measured");
+  auto* measured =
+      calibrate.app->add_option("--measured", calibrate.flags->measured,
+                                "the wedge_steps.json of a painted wedge, with the readings filled in");
   calibrate.app
-      ->add_flag("--wedge", calibrate.flags->is_wedge,
-                 "write a wedge to paint: wedge.wrl, its settings wedge.json, and wedge_steps.json to fill in")
+      ->add_flag(
+          "--wedge", calibrate.flags->is_wedge,
+          "write a wedge to paint: wedge.wrl, its settings wedge.json, and wedge_steps.json to fill in")
       ->excludes(measured);
   calibrate.flags->settings.add_paint_flags_to(*calibrate.app);
 }

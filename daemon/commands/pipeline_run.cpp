@@ -153,7 +153,8 @@ class Protocol {
       const auto fraction = message.find("fraction");
       const double value = fraction != message.end() && fraction->is_number() ? fraction->get<double>() : 0;
       if (listener_.on_progress) listener_.on_progress(stage->get<std::string>(), std::clamp(value, 0., 1.));
-    } else if (const auto warning = message.find("warning"); warning != message.end() && warning->is_string()) {
+    } else if (const auto warning = message.find("warning");
+               warning != message.end() && warning->is_string()) {
       if (listener_.on_warning) listener_.on_warning(warning->get<std::string>());
     } else if (message.contains("result")) {
       result = message["result"];
@@ -167,9 +168,10 @@ class Protocol {
 };
 
 /// Reads both outputs until the child has closed them.
-void follow(Child& child, const Descriptor& out, const Descriptor& err, InterruptWatch& interrupts, Protocol& protocol,
-            std::string& child_stderr) {
-  std::array<pollfd, 3> entries{{{out.get(), POLLIN, 0}, {err.get(), POLLIN, 0}, {interrupts.descriptor(), POLLIN, 0}}};
+void follow(Child& child, const Descriptor& out, const Descriptor& err, InterruptWatch& interrupts,
+            Protocol& protocol, std::string& child_stderr) {
+  std::array<pollfd, 3> entries{
+      {{out.get(), POLLIN, 0}, {err.get(), POLLIN, 0}, {interrupts.descriptor(), POLLIN, 0}}};
   std::array<char, 65536> block;
   while (entries[0].fd >= 0 || entries[1].fd >= 0) {
     if (poll(entries.data(), entries.size(), -1) < 0 && errno != EINTR)
@@ -190,7 +192,8 @@ void follow(Child& child, const Descriptor& out, const Descriptor& err, Interrup
         protocol.take(block.data(), static_cast<std::size_t>(count));
       } else {
         child_stderr.append(block.data(), static_cast<std::size_t>(count));
-        if (child_stderr.size() > kStderrBytesKept) child_stderr.erase(0, child_stderr.size() - kStderrBytesKept);
+        if (child_stderr.size() > kStderrBytesKept)
+          child_stderr.erase(0, child_stderr.size() - kStderrBytesKept);
       }
     }
   }
@@ -198,21 +201,25 @@ void follow(Child& child, const Descriptor& out, const Descriptor& err, Interrup
 
 std::string signal_sentence(int signal) {
   const char* name = strsignal(signal);
-  const std::string by = " (signal " + std::to_string(signal) + ", " + (name != nullptr ? name : "unknown") + ")";
+  const std::string by =
+      " (signal " + std::to_string(signal) + ", " + (name != nullptr ? name : "unknown") + ")";
   if (signal == SIGKILL)
     return "hilbrush-pipeline was killed" + by +
            ", probably because memory ran out: fewer dots, a smaller texture or a coarser mesh need less";
   if (signal == SIGXCPU || signal == SIGXFSZ)
     return "hilbrush-pipeline was ended by a resource limit of this session" + by + ": see `ulimit -a`";
-  if (signal == SIGTERM || signal == SIGINT || signal == SIGHUP) return "hilbrush-pipeline was ended from outside" + by;
+  if (signal == SIGTERM || signal == SIGINT || signal == SIGHUP)
+    return "hilbrush-pipeline was ended from outside" + by;
   return "hilbrush-pipeline crashed" + by + "; this is a fault of the program, not of the model";
 }
 
 /// Returns the result. @throws PipelineFailure with the reason if there is none.
 std::string conclude(int status, const Protocol& protocol, const std::string& child_stderr) {
-  if (WIFSIGNALED(status)) throw PipelineFailure(kExitInternal, signal_sentence(WTERMSIG(status)), {}, child_stderr);
+  if (WIFSIGNALED(status))
+    throw PipelineFailure(kExitInternal, signal_sentence(WTERMSIG(status)), {}, child_stderr);
   const int code = WEXITSTATUS(status);
-  if (code == 127) throw PipelineFailure(kExitInternal, "hilbrush-pipeline cannot be started", {}, child_stderr);
+  if (code == 127)
+    throw PipelineFailure(kExitInternal, "hilbrush-pipeline cannot be started", {}, child_stderr);
   if (protocol.error && protocol.error->is_object()) {
     const auto text = [&](const char* key) {
       const auto found = protocol.error->find(key);
@@ -231,12 +238,14 @@ std::string conclude(int status, const Protocol& protocol, const std::string& ch
 
 std::string find_pipeline_program() {
   std::error_code error;
-  if (const char* program = std::getenv("HILBRUSH_PIPELINE"); program != nullptr && *program != '\0') return program;
+  if (const char* program = std::getenv("HILBRUSH_PIPELINE"); program != nullptr && *program != '\0')
+    return program;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path program = self.parent_path() / "hilbrush-pipeline";
   if (error || access(program.c_str(), X_OK) != 0)
-    throw PipelineFailure(kExitInternal, "there is no program " + program.string() +
-                                             ": is the installation complete? HILBRUSH_PIPELINE may name another");
+    throw PipelineFailure(kExitInternal,
+                          "there is no program " + program.string() +
+                              ": is the installation complete? HILBRUSH_PIPELINE may name another");
   return program.string();
 }
 

@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
-/// Runs hilbrush-pipeline, which does all work on a mesh, as a child process. The child prints one JSON object a line:
+/// Runs hilbrush-pipeline, which does all work on a mesh, as a child process. The child prints one JSON
+/// object a line:
 ///   {"stage":"plan","fraction":0.4}   {"warning":"..."}   and last {"result":{...}} or
 ///   {"error":{"at":"cup.wrl:12","message":"..."}}
-/// and ends with one of the exit codes 0 to 3. Other output goes to standard error, which is quoted if the child fails.
+/// and ends with one of the exit codes 0 to 3. Other output goes to standard error, which is quoted if the
+/// child fails.
 namespace hilbrush {
 
 struct PipelineRunListener {
@@ -19,7 +21,8 @@ struct PipelineRunListener {
 /// The run failed; what() is a sentence for the operator, at() the file or key at fault, if there is one.
 class PipelineFailure : public std::runtime_error {
  public:
-  PipelineFailure(int exit_code, const std::string& sentence, std::string at = {}, std::string child_stderr = {})
+  PipelineFailure(int exit_code, const std::string& sentence, std::string at = {},
+                  std::string child_stderr = {})
       : std::runtime_error(sentence),
         exit_code_(exit_code),
         at_(std::move(at)),
@@ -36,8 +39,8 @@ class PipelineFailure : public std::runtime_error {
 /// $HILBRUSH_PIPELINE, or hilbrush-pipeline beside this program. @throws PipelineFailure if there is none.
 std::string find_pipeline_program();
 
-/// Runs `program` with `arguments` to its end and returns the text of its result. The child has a process group of its
-/// own; Ctrl-C and SIGTERM end the whole group. @throws PipelineFailure, Interrupted
+/// Runs `program` with `arguments` to its end and returns the text of its result. The child has a process
+/// group of its own; Ctrl-C and SIGTERM end the whole group. @throws PipelineFailure, Interrupted
 std::string run_pipeline_program(const std::string& program, const std::vector<std::string>& arguments,
                                  const PipelineRunListener& listener);
 

@@ -26,7 +26,8 @@ std::string bar_text(double fraction, std::string text, int columns) {
 
 }  // namespace
 
-void ProgressDisplay::show(const std::string& phase, double fraction, const std::string& text, bool lines_every_tenth) {
+void ProgressDisplay::show(const std::string& phase, double fraction, const std::string& text,
+                           bool lines_every_tenth) {
   if (is_quiet_) return;
   fraction = std::isfinite(fraction) ? std::clamp(fraction, 0., 1.) : 0;
   if (!terminal_.out_is_terminal) {
@@ -61,8 +62,8 @@ void ProgressDisplay::finish() {
 
 void ProgressDisplay::clear_bar() {
   if (drawn_.empty()) return;
-  // A window that has become narrower has wrapped the bar into several rows: up to the first, erase to the screen's
-  // end.
+  // A window that has become narrower has wrapped the bar into several rows: up to the first, erase to the
+  // screen's end.
   const auto columns = static_cast<std::size_t>(std::max(1, terminal_.columns()));
   if (const std::size_t rows = (drawn_.size() - 1) / columns; rows > 0)
     terminal_.out << "\033[" << rows << "A\r\033[J" << std::flush;

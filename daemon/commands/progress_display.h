@@ -14,10 +14,11 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  /// If the text does not fit beside the bar, the bar is drawn shorter, then the last of the text's parts, which commas
-  /// separate, are left out. In a pipe a line is printed when `phase` changes and, if `lines_every_tenth`, at every
-  /// tenth of it.
-  void show(const std::string& phase, double fraction, const std::string& text, bool lines_every_tenth = false);
+  /// If the text does not fit beside the bar, the bar is drawn shorter, then the last of the text's parts,
+  /// which commas separate, are left out. In a pipe a line is printed when `phase` changes and, if
+  /// `lines_every_tenth`, at every tenth of it.
+  void show(const std::string& phase, double fraction, const std::string& text,
+            bool lines_every_tenth = false);
   /// A line of its own, above the bar.
   void print_above(const std::string& line);
   /// Removes the bar.

@@ -55,9 +55,9 @@ std::string request_of(const QualityFlags& flags) {
   } else {
     json["set"] = fs::exists(flags.set, error) ? existing_file(flags.set, "model") : flags.set;
   }
-  for (const auto& [key, value] :
-       {std::pair{"sampler", &flags.sampler}, std::pair{"curve", &flags.curve}, std::pair{"area", &flags.area},
-        std::pair{"density", &flags.density}, std::pair{"points", &flags.points}})
+  for (const auto& [key, value] : {std::pair{"sampler", &flags.sampler}, std::pair{"curve", &flags.curve},
+                                   std::pair{"area", &flags.area}, std::pair{"density", &flags.density},
+                                   std::pair{"points", &flags.points}})
     if (!value->empty()) json[key] = *value;
   if (!flags.counts.empty()) json["count"] = flags.counts;
   if (flags.seed) json["seed"] = *flags.seed;
@@ -104,8 +104,9 @@ class FigureTable {
     for (const Json& size : sizes_) {
       const Json value = size.contains(where) ? size.at(where) : Json();
       any = any || value.is_number();
-      row += cell_text(where.to_string() == "/count" ? format_count(value.is_number() ? value.get<double>() : 0)
-                                                     : number_text(value));
+      row +=
+          cell_text(where.to_string() == "/count" ? format_count(value.is_number() ? value.get<double>() : 0)
+                                                  : number_text(value));
     }
     if (!slope.is_null()) row += cell_text(number_text(slope));
     if (any) text_ += row + '\n';
@@ -128,9 +129,10 @@ std::string format_quality(const Json& json) {
   table.add("dots", Json::json_pointer("/count"), sizes.size() > 1 ? Json("slope") : Json());
   for (const auto& [shapes, unused] : member(sizes.front(), "discrepancy").items()) {
     const Json& slopes = member(member(json, "slopes"), shapes.c_str());
-    table.add("discrepancy, " + heading_text(shapes) + ", rms", Json::json_pointer("/discrepancy/" + shapes + "/rms"),
-              member(slopes, "rms"));
-    table.add("    largest", Json::json_pointer("/discrepancy/" + shapes + "/largest"), member(slopes, "largest"));
+    table.add("discrepancy, " + heading_text(shapes) + ", rms",
+              Json::json_pointer("/discrepancy/" + shapes + "/rms"), member(slopes, "rms"));
+    table.add("    largest", Json::json_pointer("/discrepancy/" + shapes + "/largest"),
+              member(slopes, "largest"));
   }
   table.add("smallest spacing / densest packing", Json::json_pointer("/spacing/smallest"));
   table.add("mean spacing / densest packing", Json::json_pointer("/spacing/mean"));
@@ -147,8 +149,9 @@ std::string format_quality(const Json& json) {
   const Json& coherence = member(json, "coherence");
   if (coherence.is_object())
     for (const auto& [curve, figures] : coherence.items())
-      text += "  coherence of " + printable(curve) + ": correlation " + number_text(member(figures, "correlation")) +
-              ", Hoelder constant " + number_text(member(figures, "hoelder")) + '\n';
+      text += "  coherence of " + printable(curve) + ": correlation " +
+              number_text(member(figures, "correlation")) + ", Hoelder constant " +
+              number_text(member(figures, "hoelder")) + '\n';
   return text;
 }
 
@@ -177,7 +180,8 @@ int run(CommandContext& context, const QualityFlags& flags) {
   const Json json = Json::parse(result);
   context.terminal.out << format_quality(json);
   for (const Json& file : member(json, "files"))
-    if (file.is_string()) context.terminal.out << "  " << printable((fs::path(flags.output) / file).string()) << '\n';
+    if (file.is_string())
+      context.terminal.out << "  " << printable((fs::path(flags.output) / file).string()) << '\n';
   return kExitOk;
 }
 
@@ -185,38 +189,45 @@ int run(CommandContext& context, const QualityFlags& flags) {
 
 void add_quality_command(CLI::App& app, CommandContext& context) {
   auto flags = std::make_shared<QualityFlags>();
-  CLI::App* command =
-      add_command(app, context, "quality",
-                  "measure how evenly dots lie: discrepancy, spectrum, spacing, holes, path; needs no daemon");
+  CLI::App* command = add_command(
+      app, context, "quality",
+      "measure how evenly dots lie: discrepancy, spectrum, spacing, holes, path; needs no daemon");
   command
       ->add_option(
           "SET", flags->set,
           "what to measure: plane, sphere, monkey_saddle, eight_surface, whitney_umbrella, super_ellipsoid, "
-          "super_ellipsoid_reparameterized or equal_area_sphere; or a model file, to place dots on; or with --model "
+          "super_ellipsoid_reparameterized or equal_area_sphere; or a model file, to place dots on; or with "
+          "--model "
           "the dots.ply of a dry run")
       ->required();
-  command->add_option("-o,--output", flags->output, "folder for quality.json and plots, made if absent")->required();
+  command->add_option("-o,--output", flags->output, "folder for quality.json and plots, made if absent")
+      ->required();
   command->add_option("--model", flags->model, "the model that the dots of SET were placed on");
-  command->add_option("--settings", flags->settings,
-                      "JSON file with the settings of that job (default: those in the report.json beside SET)");
-  command->add_option("--sampler", flags->sampler,
-                      "how dots are placed: centroid (default), jittered, even, random, halton, hammersley, sobol, "
-                      "niederreiter; on models also blue");
+  command->add_option(
+      "--settings", flags->settings,
+      "JSON file with the settings of that job (default: those in the report.json beside SET)");
+  command->add_option(
+      "--sampler", flags->sampler,
+      "how dots are placed: centroid (default), jittered, even, random, halton, hammersley, sobol, "
+      "niederreiter; on models also blue");
   command->add_option("--curve", flags->curve, "hilbert (default) or peano2");
   command->add_option("--area", flags->area,
                       "of surfaces by name: triangle, square or first_fundamental_form (default)");
   command->add_option("--density", flags->density,
                       "constant (default); on surfaces by name also u, u+v, mean_curvature, "
                       "gaussian_curvature; on models also texture, mean_curvature, gaussian_curvature");
-  command->add_option("--points", flags->points,
-                      "instead of dots along a curve, in the plane or on the sphere: random, jittered, halton, "
-                      "hammersley, sobol or niederreiter");
+  command->add_option(
+      "--points", flags->points,
+      "instead of dots along a curve, in the plane or on the sphere: random, jittered, halton, "
+      "hammersley, sobol or niederreiter");
   command->add_option("--count", flags->counts, "number of dots (default 10000); two or more give slopes")
       ->delimiter(',')
       ->check(not_negative());
   command->add_option("--seed", flags->seed, "of the random numbers (default 1)")->check(not_negative());
-  command->add_option("--shapes", flags->shapes, "test shapes of each kind (default 1000)")->check(not_negative());
-  command->callback([&context, flags] { context.action = [&context, flags] { return run(context, *flags); }; });
+  command->add_option("--shapes", flags->shapes, "test shapes of each kind (default 1000)")
+      ->check(not_negative());
+  command->callback(
+      [&context, flags] { context.action = [&context, flags] { return run(context, *flags); }; });
 }
 
 }  // namespace hilbrush

@@ -58,7 +58,8 @@ std::string text_of(const Json& object, const char* key) {
 
 }  // namespace
 
-RpcClient::RpcClient(std::string socket_path, Milliseconds timeout) : path_(std::move(socket_path)), timeout_(timeout) {
+RpcClient::RpcClient(std::string socket_path, Milliseconds timeout)
+    : path_(std::move(socket_path)), timeout_(timeout) {
   try {
     if (path_.starts_with(kTcp))
       connect_tcp(Clock::now() + timeout_);
@@ -204,7 +205,8 @@ Json RpcClient::call(const std::string& method, const Json& params, std::optiona
     if (answered != id && !(answered.is_null() && has_error))
       throw ConnectionError("the daemon answered a request that was not made");
     if (has_error) throw_refusal((*message)["error"]);
-    if (!message->contains("result")) throw ConnectionError("the daemon's answer has neither result nor error");
+    if (!message->contains("result"))
+      throw ConnectionError("the daemon's answer has neither result nor error");
     return (*message)["result"];
   }
   throw ConnectionError("the daemon on " + path_ + " did not answer " + method + " in " +

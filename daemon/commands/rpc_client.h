@@ -7,10 +7,12 @@
 #include <stdexcept>
 #include <string>
 
-/// The client's end of the daemon's socket: JSON-RPC 2.0, one message a line, blocking, with a timeout on everything.
+/// The client's end of the daemon's socket: JSON-RPC 2.0, one message a line, blocking, with a timeout on
+/// everything.
 namespace hilbrush {
 
-/// No daemon, a lost or silent connection, or answers that are not JSON-RPC. what() is a sentence for the operator.
+/// No daemon, a lost or silent connection, or answers that are not JSON-RPC. what() is a sentence for the
+/// operator.
 class ConnectionError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -46,7 +48,8 @@ class RpcClient {
   RpcClient& operator=(const RpcClient&) = delete;
 
   /// Sends a request and returns its result. Notifications that come in between are kept.
-  /// @throws RpcRefusal, ConnectionError (also if there is no answer in time; the connection cannot be used after that)
+  /// @throws RpcRefusal, ConnectionError (also if there is no answer in time; the connection cannot be used
+  /// after that)
   nlohmann::ordered_json call(const std::string& method, const nlohmann::ordered_json& params,
                               std::optional<Milliseconds> timeout = {});
 

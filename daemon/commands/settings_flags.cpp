@@ -31,7 +31,8 @@ std::string flag_of_path(const std::string& path) {
 template <class T>
 void refuse_not_finite(const char* key, const T& value) {
   if constexpr (std::is_same_v<T, double>) {
-    if (!std::isfinite(value)) throw InputError(std::string("$.") + key, "expected a number, found " + number(value));
+    if (!std::isfinite(value))
+      throw InputError(std::string("$.") + key, "expected a number, found " + number(value));
   } else if constexpr (std::is_same_v<T, std::vector<double>>) {
     for (const double each : value) refuse_not_finite(key, each);
   }
@@ -73,11 +74,13 @@ void add_size_flags(SettingsFlags& flags, CLI::App& command) {
   command.add_option("--dots", flags.dots, "instead of --dpi: the exact number of dots")
       ->check(not_negative())
       ->group(kGroup);
-  command.add_option("--size-mm", flags.size_mm, "scale the longest side of the model to this")->group(kGroup);
+  command.add_option("--size-mm", flags.size_mm, "scale the longest side of the model to this")
+      ->group(kGroup);
   command.add_option("--units-mm", flags.units_mm, "instead of --size-mm: millimeters per unit of the file")
       ->group(kGroup);
   command
-      .add_option("--up", flags.up, "the axis of the model that points up, y or z (default: that of the file format)")
+      .add_option("--up", flags.up,
+                  "the axis of the model that points up, y or z (default: that of the file format)")
       ->group(kGroup);
 }
 
@@ -131,16 +134,21 @@ void add_mounting_flags(SettingsFlags& flags, CLI::App& command) {
       .add_option("--post-height-mm", flags.post_height_mm,
                   "of the post under the object, 0 to 1000 (default: the cell's)")
       ->group(kGroup);
-  command.add_option("--post-radius-mm", flags.post_radius_mm, "of the post (default: the cell's)")->group(kGroup);
-  command.add_option("--plate-radius-mm", flags.plate_radius_mm, "of the table's plate (default: the cell's)")
+  command.add_option("--post-radius-mm", flags.post_radius_mm, "of the post (default: the cell's)")
       ->group(kGroup);
   command
-      .add_option("--offset-mm", flags.offset_mm,
-                  "x,y,z of the object from the center of the post's top (default 0,0,0: centered, standing on it)")
+      .add_option("--plate-radius-mm", flags.plate_radius_mm, "of the table's plate (default: the cell's)")
+      ->group(kGroup);
+  command
+      .add_option(
+          "--offset-mm", flags.offset_mm,
+          "x,y,z of the object from the center of the post's top (default 0,0,0: centered, standing on it)")
       ->delimiter(',')
       ->expected(3)
       ->group(kGroup);
-  command.add_option("--turn-deg", flags.turn_deg, "turn of the object about the post, before the offset (default 0)")
+  command
+      .add_option("--turn-deg", flags.turn_deg,
+                  "turn of the object about the post, before the offset (default 0)")
       ->group(kGroup);
 }
 
@@ -188,27 +196,34 @@ void SettingsFlags::add_to(CLI::App& command) {
 
 void SettingsFlags::add_paint_flags_to(CLI::App& command) {
   command
-      .add_option("--sampler", sampler,
-                  "centroid (default), jittered, even, random, halton, hammersley, sobol, niederreiter, blue or fine")
+      .add_option(
+          "--sampler", sampler,
+          "centroid (default), jittered, even, random, halton, hammersley, sobol, niederreiter, blue or fine")
       ->group(kGroup);
   command.add_option("--curve", curve, "hilbert (default), peano2 or laminar")->group(kGroup);
   command.add_option("--levels", levels, "number of energies that a dot may have, 1 to 4 (default 1)")
       ->check(not_negative())
       ->group(kGroup);
-  command.add_option("--fine-passes", fine_passes, "of the sampler fine, each over all dots, 1 to 1000 (default 24)")
+  command
+      .add_option("--fine-passes", fine_passes,
+                  "of the sampler fine, each over all dots, 1 to 1000 (default 24)")
       ->check(not_negative())
       ->group(kGroup);
-  command.add_option("--seed", seed, "of the random numbers (default 1)")->check(not_negative())->group(kGroup);
+  command.add_option("--seed", seed, "of the random numbers (default 1)")
+      ->check(not_negative())
+      ->group(kGroup);
   command.add_option("--cell", cell, "name of a cell, or its file (default: default)")->group(kGroup);
-  command.add_option("--settings", file, "JSON file with any of these settings; flags override it")->group(kGroup);
-  if (command.get_option_no_throw("--dpi") == nullptr) command.add_option("--dpi", dpi, kDpiHelp)->group(kGroup);
+  command.add_option("--settings", file, "JSON file with any of these settings; flags override it")
+      ->group(kGroup);
+  if (command.get_option_no_throw("--dpi") == nullptr)
+    command.add_option("--dpi", dpi, kDpiHelp)->group(kGroup);
 }
 
 bool SettingsFlags::any() const {
-  return !file.empty() || dpi || size_mm || units_mm || max_incidence_deg || preferred_incidence_deg || dots || seed ||
-         up || untextured || sampler || curve || density || levels || predictive_rounds || largest_gap_pitches ||
-         fine_passes || tone_curve || planning || order || policy || cell || post_height_mm || post_radius_mm ||
-         plate_radius_mm || turn_deg || !offset_mm.empty();
+  return !file.empty() || dpi || size_mm || units_mm || max_incidence_deg || preferred_incidence_deg ||
+         dots || seed || up || untextured || sampler || curve || density || levels || predictive_rounds ||
+         largest_gap_pitches || fine_passes || tone_curve || planning || order || policy || cell ||
+         post_height_mm || post_radius_mm || plate_radius_mm || turn_deg || !offset_mm.empty();
 }
 
 std::string SettingsFlags::to_json(const std::string& base, const std::string& base_origin) const {

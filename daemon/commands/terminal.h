@@ -19,8 +19,8 @@ struct Terminal {
   int columns() const { return measure_width ? measure_width() : width; }
 };
 
-/// The text with control characters replaced by spaces, so that it cannot control the terminal. For text that comes
-/// from files and sockets.
+/// The text with control characters replaced by spaces, so that it cannot control the terminal. For text that
+/// comes from files and sockets.
 std::string printable(const std::string& text);
 
 }  // namespace hilbrush

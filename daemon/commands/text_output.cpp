@@ -23,7 +23,8 @@ constexpr int kLabelWidth = 15;
 /// "  label:      value\n".
 std::string line(const std::string& label, const std::string& value) {
   std::ostringstream out;
-  out << "  " << std::left << std::setw(kLabelWidth - 1) << printable(label) + ":" << ' ' << printable(value) << '\n';
+  out << "  " << std::left << std::setw(kLabelWidth - 1) << printable(label) + ":" << ' ' << printable(value)
+      << '\n';
   return out.str();
 }
 
@@ -59,7 +60,8 @@ std::string skipped_text(const Json& skipped) {
     for (const auto& [reason, count] : skipped.items()) {
       if (!count.is_number() || count.get<double>() == 0) continue;
       sum += count.get<double>();
-      reasons += (reasons.empty() ? "" : ", ") + format_count(count.get<double>()) + " " + reason_text(reason);
+      reasons +=
+          (reasons.empty() ? "" : ", ") + format_count(count.get<double>()) + " " + reason_text(reason);
     }
   }
   return format_count(sum) + " skipped" + (reasons.empty() ? "" : " (" + reasons + ")");
@@ -71,8 +73,10 @@ std::string dots_text(const Json& dots) {
   std::string text = format_count(placed) + " placed, " + format_count(exposed) + " exposed";
   if (placed > 0) text += " (" + fixed(std::floor(1e4 * exposed / placed) / 100, 2) + " %)";
   text += ", " + skipped_text(member(dots, "skipped"));
-  if (number_field(dots, "remaining") > 0) text += ", " + format_count(number_field(dots, "remaining")) + " remaining";
-  if (number_field(dots, "in_doubt") > 0) text += ", " + format_count(number_field(dots, "in_doubt")) + " in doubt";
+  if (number_field(dots, "remaining") > 0)
+    text += ", " + format_count(number_field(dots, "remaining")) + " remaining";
+  if (number_field(dots, "in_doubt") > 0)
+    text += ", " + format_count(number_field(dots, "in_doubt")) + " in doubt";
   return text;
 }
 
@@ -96,8 +100,8 @@ std::optional<std::array<double, 3>> vector_field(const Json& object, const char
   return numbers;
 }
 
-/// How large the object is and where it stands, from `size_mm`, `min_mm` and `max_mm`: a wrong unit or offset is to be
-/// seen before anything is painted.
+/// How large the object is and where it stands, from `size_mm`, `min_mm` and `max_mm`: a wrong unit or offset
+/// is to be seen before anything is painted.
 std::string extent_lines(const Json& object) {
   constexpr int kDigits = 2;
   std::string text;
@@ -118,9 +122,9 @@ std::string repairs_text(const Json& repairs) {
   std::string text;
   if (!repairs.is_array()) return text;
   for (const Json& repair : repairs) {
-    const std::string one = repair.is_object()
-                                ? format_count(number_field(repair, "count")) + " " + text_field(repair, "what")
-                                : value_text(repair);
+    const std::string one =
+        repair.is_object() ? format_count(number_field(repair, "count")) + " " + text_field(repair, "what")
+                           : value_text(repair);
     text += (text.empty() ? "" : ", ") + one;
   }
   return text;
@@ -131,7 +135,8 @@ std::string time_text(const Json& time) {
   std::string parts;
   for (const char* part : {"move", "settle", "expose", "retract"})
     if (has_number(time, part))
-      parts += (parts.empty() ? "" : ", ") + std::string(part) + " " + format_duration(number_field(time, part));
+      parts +=
+          (parts.empty() ? "" : ", ") + std::string(part) + " " + format_duration(number_field(time, part));
   return text + (parts.empty() ? "" : " (" + parts + ")");
 }
 
@@ -141,7 +146,8 @@ std::string fidelity_text(const Json& fidelity) {
                      fixed(number_field(fidelity, "s2", NAN), 3) + ", tone rms " +
                      fixed(number_field(fidelity, "tone_rms", NAN), 4);
   if (has_number(fidelity, "unreachable_share"))
-    text += "; " + fixed(100 * number_field(fidelity, "unreachable_share"), 2) + " % of the surface is out of reach";
+    text += "; " + fixed(100 * number_field(fidelity, "unreachable_share"), 2) +
+            " % of the surface is out of reach";
   return text;
 }
 
@@ -151,7 +157,9 @@ std::string id_text(const Json& job) {
 }
 
 std::string percent_text(const Json& job) {
-  return std::to_string(static_cast<int>(std::floor(100 * std::clamp(number_field(job, "progress"), 0., 1.)))) + " %";
+  return std::to_string(
+             static_cast<int>(std::floor(100 * std::clamp(number_field(job, "progress"), 0., 1.)))) +
+         " %";
 }
 
 std::string joints_text(const Json& joints) {
@@ -257,12 +265,14 @@ std::string format_report(const Json& report) {
   text += cause_lines(member(report, "skipped"));
   if (const Json& suggestion = member(report, "suggestion"); suggestion.is_object())
     text += line("suggestion", text_field(suggestion, "text"));
-  if (has_number(report, "pitch_mm")) text += line("pitch", fixed(number_field(report, "pitch_mm"), 3) + " mm");
+  if (has_number(report, "pitch_mm"))
+    text += line("pitch", fixed(number_field(report, "pitch_mm"), 3) + " mm");
   if (const Json& incidence = member(report, "incidence_deg"); incidence.is_object())
     text += line("incidence", "mean " + fixed(number_field(incidence, "mean"), 1) + ", 95 % below " +
                                   fixed(number_field(incidence, "p95"), 1) + ", at most " +
                                   fixed(number_field(incidence, "max"), 1) + " degrees");
-  if (const Json& time = member(report, "time_s"); time.is_object()) text += line("painting time", time_text(time));
+  if (const Json& time = member(report, "time_s"); time.is_object())
+    text += line("painting time", time_text(time));
   if (const Json& fidelity = member(report, "fidelity"); fidelity.is_object())
     text += line("fidelity", fidelity_text(fidelity));
   if (const Json& stages = member(report, "stages_s"); stages.is_object() && has_number(stages, "total"))
@@ -278,7 +288,8 @@ std::string format_tone_curve(const Json& curve) {
   const Json& asked = member(curve, "asked");
   std::string text;
   if (!wanted.is_array() || !asked.is_array()) return format_fields(curve);
-  if (const std::string sampler = text_field(curve, "sampler"); !sampler.empty()) text += line("sampler", sampler);
+  if (const std::string sampler = text_field(curve, "sampler"); !sampler.empty())
+    text += line("sampler", sampler);
   text += "  wanted  asked\n";
   for (std::size_t i = 0; i < std::min(wanted.size(), asked.size()); ++i)
     if (wanted[i].is_number() && asked[i].is_number())
@@ -306,7 +317,8 @@ std::string format_job_line(const Json& job) {
   std::string text = "job " + id_text(job) + ": " + state + copy_text(job);
   if (state == "planning") return text + (stage.empty() ? "" : ", " + stage) + " " + percent_text(job);
   if (const double placed = number_field(dots, "placed"); placed > 0)
-    text += ", " + format_count(number_field(dots, "exposed")) + " of " + format_count(placed) + " dots exposed";
+    text +=
+        ", " + format_count(number_field(dots, "exposed")) + " of " + format_count(placed) + " dots exposed";
   if (state == "painting" || state == "paused") text += ", " + percent_text(job);
   if (has_number(job, "eta_s")) text += ", about " + format_duration(number_field(job, "eta_s")) + " left";
   if (const std::string why = format_job_error(job); state == "paused" && !why.empty()) text += ": " + why;
@@ -359,21 +371,25 @@ std::string format_job(const Json& job) {
   std::string text = line("job", id_text(job)) + line("state", text_field(job, "state", "?"));
   text += line("model", text_field(job, "model"));
   text += line("kind", member(job, "dry_run") == true ? "dry run" : "real");
-  text += line("progress", percent_text(job) + (has_number(job, "eta_s")
-                                                    ? ", about " + format_duration(number_field(job, "eta_s")) + " left"
-                                                    : ""));
+  text += line("progress",
+               percent_text(job) + (has_number(job, "eta_s")
+                                        ? ", about " + format_duration(number_field(job, "eta_s")) + " left"
+                                        : ""));
   if (const Json& dots = member(job, "dots"); dots.is_object()) text += line("dots", dots_text(dots));
   text += format_plan(job);
   if (const double copies = number_field(job, "copies"); copies > 1)
-    text += line("copies", format_count(number_field(job, "copies_done")) + " of " + format_count(copies) + " painted");
-  if (member(job, "needs_part_in_place") == true) text += line("part", "must be confirmed to be in its place");
+    text += line("copies",
+                 format_count(number_field(job, "copies_done")) + " of " + format_count(copies) + " painted");
+  if (member(job, "needs_part_in_place") == true)
+    text += line("part", "must be confirmed to be in its place");
   if (const Json& timing = member(job, "timing"); timing.is_object()) {
     text += line("own time", own_time_text(timing));
     if (const Json& measured = member(timing, "measured"); measured.is_object()) {
       const bool is_too_little = member(timing, "measured_is_enough") == false;
-      text += line("measured", measured.dump() + (is_too_little ? ", from too few moves for a cell file: " +
-                                                                      value_text(member(timing, "measured_moves"))
-                                                                : ""));
+      text +=
+          line("measured", measured.dump() + (is_too_little ? ", from too few moves for a cell file: " +
+                                                                  value_text(member(timing, "measured_moves"))
+                                                            : ""));
     }
   }
   if (const std::string error = format_job_error(job); !error.empty()) text += line("error", error);
@@ -381,9 +397,10 @@ std::string format_job(const Json& job) {
     text += line("settings", settings_text(settings));
   if (const Json& warnings = member(job, "warnings"); warnings.is_array())
     for (const Json& warning : warnings) text += line("warning", value_text(warning));
-  static constexpr std::array kShown{"id",     "state",    "model",    "dry_run", "progress",    "eta_s",
-                                     "dots",   "error",    "warnings", "copies",  "copies_done", "needs_part_in_place",
-                                     "timing", "settings", "plan"};
+  static constexpr std::array kShown{"id",       "state",    "model",       "dry_run",
+                                     "progress", "eta_s",    "dots",        "error",
+                                     "warnings", "copies",   "copies_done", "needs_part_in_place",
+                                     "timing",   "settings", "plan"};
   for (const auto& [key, value] : job.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });
@@ -397,7 +414,8 @@ std::string format_job_table(const Json& jobs) {
   if (!jobs.is_array() || jobs.empty()) return "no jobs\n";
   std::vector<std::array<std::string, 6>> rows{{"ID", "STATE", "KIND", "DOTS", "DONE", "MODEL"}};
   for (const Json& job : jobs)
-    rows.push_back({id_text(job), text_field(job, "state", "?"), member(job, "dry_run") == true ? "dry" : "real",
+    rows.push_back({id_text(job), text_field(job, "state", "?"),
+                    member(job, "dry_run") == true ? "dry" : "real",
                     format_count(number_field(member(job, "dots"), "placed")), percent_text(job),
                     text_field(job, "model")});
   std::array<std::size_t, 6> widths{};
@@ -424,7 +442,8 @@ std::string format_cell_line(const Json& cell) {
 
 std::string format_cell(const Json& cell) {
   std::string text = line("cell", text_field(cell, "state", "?"));
-  if (const Json& reason = member(cell, "reason"); !reason.is_null()) text += line("reason", value_text(reason));
+  if (const Json& reason = member(cell, "reason"); !reason.is_null())
+    text += line("reason", value_text(reason));
   if (const Json& fault = member(cell, "fault"); !fault.is_null()) text += line("fault", value_text(fault));
   text += line("laser", text_field(cell, "laser", "?"));
   if (const Json& interlock = member(cell, "interlock"); !interlock.is_null())
@@ -432,8 +451,10 @@ std::string format_cell(const Json& cell) {
   if (const Json& job = member(cell, "job"); !job.is_null()) text += line("job", value_text(job));
   if (const Json& devices = member(cell, "devices"); devices.is_object())
     text += line("devices", devices_text(devices));
-  if (const Json& joints = member(cell, "joints"); !joints.is_null()) text += line("joints", joints_text(joints));
-  static constexpr std::array kShown{"state", "laser", "fault", "job", "devices", "joints", "reason", "interlock"};
+  if (const Json& joints = member(cell, "joints"); !joints.is_null())
+    text += line("joints", joints_text(joints));
+  static constexpr std::array kShown{"state",   "laser",  "fault",  "job",
+                                     "devices", "joints", "reason", "interlock"};
   for (const auto& [key, value] : cell.items()) {
     const bool is_shown =
         std::any_of(kShown.begin(), kShown.end(), [&k = key](const char* shown) { return k == shown; });

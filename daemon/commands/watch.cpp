@@ -20,8 +20,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Whether the job has reached `until` or passed it. Painting and paused may alternate any number of times, so neither
-/// is past the other; a job of several copies is ready again after each part but the last.
+/// Whether the job has reached `until` or passed it. Painting and paused may alternate any number of times,
+/// so neither is past the other; a job of several copies is ready again after each part but the last.
 bool is_reached(const Json& job, const std::string& until) {
   const std::string state = text_field(job, "state");
   const auto rank = [](const std::string& s) {
@@ -58,7 +58,10 @@ Json next_update(RpcClient& client, InterruptWatch& interrupts) {
 class JobDisplay {
  public:
   JobDisplay(CommandContext& context, std::string id, std::string until)
-      : context_(context), id_(std::move(id)), until_(std::move(until)), bar_(context.terminal, context.is_json) {}
+      : context_(context),
+        id_(std::move(id)),
+        until_(std::move(until)),
+        bar_(context.terminal, context.is_json) {}
 
   /// @return whether the job has got where it is watched to.
   bool show(const Json& update) {
@@ -112,7 +115,8 @@ class JobDisplay {
     bar_.show(phase, number_field(job_, "progress"), text, state == "painting");
   }
 
-  /// A job that waits for its operator says so, and why it was paused: the bar would stand still without a word.
+  /// A job that waits for its operator says so, and why it was paused: the bar would stand still without a
+  /// word.
   void show_wait(const std::string& state) {
     const std::string wait = format_job_wait(job_);
     if (wait.empty()) return;

@@ -53,7 +53,8 @@ std::array<std::unique_ptr<AxisDrive>, N> make_drives(const ModbusGroupOptions<N
 /// Says that this process drives the devices of a cell file, until it ends.
 class CellLock {
  public:
-  explicit CellLock(const std::filesystem::path& cell_file) : fd_(::open(cell_file.c_str(), O_RDONLY | O_CLOEXEC)) {
+  explicit CellLock(const std::filesystem::path& cell_file)
+      : fd_(::open(cell_file.c_str(), O_RDONLY | O_CLOEXEC)) {
     if (fd_ < 0) throw InputError(cell_file.string(), std::strerror(errno));
     if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
     const int error = errno;
@@ -89,8 +90,8 @@ bool has_simulated(const CellDeviceOptions& options) {
   return options.robot.index() == 0 || options.table.index() == 0 || options.laser.index() == 0;
 }
 
-/// Real devices, and simulated ones where the cell file says so. Simulated devices have a clock of their own, which all
-/// devices follow as soon as one is simulated.
+/// Real devices, and simulated ones where the cell file says so. Simulated devices have a clock of their own,
+/// which all devices follow as soon as one is simulated.
 class RealDevices final : public CellDevices {
  public:
   RealDevices(const CellDescription& description, const CellDeviceOptions& options,
@@ -124,7 +125,9 @@ class RealDevices final : public CellDevices {
     if (!laser_) keeper_.record(sim_, file);
   }
   std::vector<std::string> identify_robot() override {
-    return dobot_ ? dobot_->identify() : robot_axes_ ? robot_axes_->identify() : CellDevices::identify_robot();
+    return dobot_        ? dobot_->identify()
+           : robot_axes_ ? robot_axes_->identify()
+                         : CellDevices::identify_robot();
   }
   std::vector<std::string> identify_table() override {
     return table_axes_ ? table_axes_->identify() : CellDevices::identify_table();
@@ -143,9 +146,12 @@ class RealDevices final : public CellDevices {
 
  private:
   /// The laser's link belongs to its guard, which turns it off whatever happens to this process.
-  void make_laser(const CellDescription& description, const GuardArguments& arguments, const GateOptions& gate) {
+  void make_laser(const CellDescription& description, const GuardArguments& arguments,
+                  const GateOptions& gate) {
     auto process = std::make_shared<GuardProcess>();
-    auto launch = [process, arguments] { return process->start(guard_beside_program(), to_command_line(arguments)); };
+    auto launch = [process, arguments] {
+      return process->start(guard_beside_program(), to_command_line(arguments));
+    };
     const GuardedHead::Options options{.heartbeat_s = arguments.laser.heartbeat_s,
                                        .arm_timeout_s = arguments.laser.arm_timeout_s};
     auto head = std::make_unique<GuardedHead>(std::move(launch), options, clock_);
@@ -153,7 +159,8 @@ class RealDevices final : public CellDevices {
     const auto& limits = description.laser;
     laser_ = std::make_unique<GatedLaser>(
         std::move(head), opener,
-        Laser::Limits{limits.power_min_w, limits.power_max_w, limits.pulse_min_s, limits.pulse_max_s}, clock_);
+        Laser::Limits{limits.power_min_w, limits.power_max_w, limits.pulse_min_s, limits.pulse_max_s},
+        clock_);
   }
 
   CellLock lock_;
@@ -174,7 +181,8 @@ std::unique_ptr<CellDevices> make_cell_devices(const CellDescription& descriptio
   return make_cell_devices(description, load_cell_devices(cell_file), cell_file);
 }
 
-std::unique_ptr<CellDevices> make_cell_devices(const CellDescription& description, const CellDeviceOptions& options,
+std::unique_ptr<CellDevices> make_cell_devices(const CellDescription& description,
+                                               const CellDeviceOptions& options,
                                                const std::filesystem::path& cell_file) {
   if (options.is_simulated()) return std::make_unique<SimulatedDevices>(description);
   return std::make_unique<RealDevices>(description, options, cell_file);

@@ -3,8 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
-/// Quantiles of many durations in constant memory: counts in bins a twentieth of an octave wide (3.5 %), from a
-/// microsecond to half an hour; what is shorter or longer is counted in the first or last bin. Plain value, one thread.
+/// Quantiles of many durations in constant memory: counts in bins a twentieth of an octave wide (3.5 %), from
+/// a microsecond to half an hour; what is shorter or longer is counted in the first or last bin. Plain value,
+/// one thread.
 namespace hilbrush {
 
 class DurationHistogram {

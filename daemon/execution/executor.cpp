@@ -13,14 +13,15 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kGraceS = 5;         ///< how much later than the time model a move may end before it counts as lost
+constexpr double kGraceS = 5;  ///< how much later than the time model a move may end before it counts as lost
 constexpr double kPulseGraceS = 0.1;  ///< the same for a pulse
-/// At least this much on the wall, however fast the cell's clock runs: this host, its network and its scheduler do not
-/// run faster with it.
+/// At least this much on the wall, however fast the cell's clock runs: this host, its network and its
+/// scheduler do not run faster with it.
 constexpr double kWallGraceS = 0.25;
 
-/// A status must not be older than this, in seconds, when a pulse begins and when it is believed: on a busy machine the
-/// thread that listens to a device may have to wait while an axis drifts. Several frames, or readings.
+/// A status must not be older than this, in seconds, when a pulse begins and when it is believed: on a busy
+/// machine the thread that listens to a device may have to wait while an axis drifts. Several frames, or
+/// readings.
 constexpr double kStatusAgeMaxS = 0.03;
 constexpr double kStatusAgeMaxWallS = 0.005;
 
@@ -31,13 +32,14 @@ double grace_s(const Clock& clock, double cell_s, double wall_min_s = kWallGrace
   return wall_of_one > 0 ? std::max(cell_s, wall_min_s / wall_of_one) : cell_s;
 }
 
-/// Ends a run early without a fault; carries no text because it is thrown on the ordinary way out of a stop or a pause.
+/// Ends a run early without a fault; carries no text because it is thrown on the ordinary way out of a stop
+/// or a pause.
 struct RunEnded {
   ExecutionOutcome outcome;
 };
 
-/// How far the measured positions may be from a target that a device reports as reached: catches an answer to an
-/// earlier move. The windows of the devices themselves are far smaller.
+/// How far the measured positions may be from a target that a device reports as reached: catches an answer to
+/// an earlier move. The windows of the devices themselves are far smaller.
 constexpr double kPositionWindow = 3.5e-4;  ///< rad, 0.02 degrees
 constexpr double kPrismaticWindow = 2e-5;   ///< m
 
@@ -58,7 +60,8 @@ typename AxisGroup<N>::Positions chain_part(const Joints& joints) {
 template <std::size_t N>
 bool is_near(const std::array<double, N>& measured, const std::array<double, N>& target) {
   for (std::size_t i = 0; i < N; ++i)
-    if (!(std::abs(measured[i] - target[i]) <= (N == 4 && i == kJ3 ? kPrismaticWindow : kPositionWindow))) return false;
+    if (!(std::abs(measured[i] - target[i]) <= (N == 4 && i == kJ3 ? kPrismaticWindow : kPositionWindow)))
+      return false;
   return true;
 }
 
@@ -68,7 +71,8 @@ void check_under_way(const char* chain, const Status& status) {
   if (status.state == DeviceState::kReady || status.state == DeviceState::kMoving) return;
   if (status.state == DeviceState::kFault)
     throw DriverError(std::string("the ") + chain + " reports a fault: " + status.fault);
-  throw DriverError(std::string("the ") + chain + " is no longer ready but " + device_state_name(status.state));
+  throw DriverError(std::string("the ") + chain + " is no longer ready but " +
+                    device_state_name(status.state));
 }
 
 /// One run of a program. Devices are touched by this class and request_stop() only.
@@ -129,7 +133,7 @@ class Run {
   Joints at_{};                                   ///< where the last finished move ended
   std::optional<Robot::Positions> robot_target_;  ///< last sent to each chain in this run
   std::optional<Table::Positions> table_target_;
-  double rung_down_s_ = 0;         ///< when what was passed without settling will be at rest, on the cell's clock
+  double rung_down_s_ = 0;  ///< when what was passed without settling will be at rest, on the cell's clock
   bool is_off_verified_ = false;   ///< since the last pulse
   std::vector<Joints> path_;       ///< to the exposure under way
   std::size_t next_exposure_ = 0;  ///< that exposure
@@ -151,7 +155,8 @@ void Run::end_if_asked_or_paused() const {
 }
 
 /// One exchange with the device after each pulse, and at the beginning; the laser then stays off
-/// until the next pulse, which only this class orders. The last frame is checked every time: that costs nothing.
+/// until the next pulse, which only this class orders. The last frame is checked every time: that costs
+/// nothing.
 void Run::verify_laser_off() {
   if (!is_off_verified_ && !cell_.laser.off()) throw DriverError("the laser does not confirm that it is off");
   is_off_verified_ = true;
@@ -191,8 +196,8 @@ void Run::check_laser_ready() {
                       (laser.fault.empty() ? "" : ": " + laser.fault));
 }
 
-/// Both chains start together at each waypoint, because that is how the path was checked. Where only one of them moves,
-/// a device that can buffer gets several waypoints at once.
+/// Both chains start together at each waypoint, because that is how the path was checked. Where only one of
+/// them moves, a device that can buffer gets several waypoints at once.
 std::size_t Run::waypoints_at_once(std::span<const Joints> path) const {
   const bool moves_robot = robot_target_ != robot_part(path[0]);
   const bool moves_table = table_target_ != table_part(path[0]);
@@ -208,9 +213,9 @@ std::size_t Run::waypoints_at_once(std::span<const Joints> path) const {
   return count;
 }
 
-/// A chain that already rests at its target is not commanded again, but must report in_position. Waypoints are passed
-/// without waiting for the axes to ring down, so what is left of that is added to the settling of the move that ends in
-/// an exposure.
+/// A chain that already rests at its target is not commanded again, but must report in_position. Waypoints
+/// are passed without waiting for the axes to ring down, so what is left of that is added to the settling of
+/// the move that ends in an exposure.
 Run::Leg Run::plan_leg(std::span<const Joints> path, Rest rest, double now_s) const {
   Leg leg;
   leg.path = path;
@@ -236,8 +241,9 @@ Run::Leg Run::plan_leg(std::span<const Joints> path, Rest rest, double now_s) co
 template <std::size_t N>
 void Run::send(AxisGroup<N>& chain, const Leg& leg, double settle_s) {
   const auto part = [](const Joints& joints) { return chain_part<N>(joints); };
-  const bool rests = std::all_of(leg.path.begin(), leg.path.end(),
-                                 [&](const Joints& target) { return part(target) == part(leg.path.front()); });
+  const bool rests = std::all_of(leg.path.begin(), leg.path.end(), [&](const Joints& target) {
+    return part(target) == part(leg.path.front());
+  });
   const auto path = rests ? leg.path.last(1) : leg.path;
   for (const Joints& target : path) chain.move_to(part(target), &target == &path.back() ? settle_s : 0);
 }
@@ -277,7 +283,8 @@ void Run::follow(std::span<const Joints> path, Rest rest) {
   }
 }
 
-/// Woken by devices that learn by themselves of an arrival or a fault, else when the devices expect to arrive.
+/// Woken by devices that learn by themselves of an arrival or a fault, else when the devices expect to
+/// arrive.
 void Run::wait_in_position(double deadline_s) {
   for (;;) {
     const double arrival_s = std::max(cell_.robot.expected_arrival_s(), cell_.table.expected_arrival_s());
@@ -295,7 +302,8 @@ void Run::wait_in_position(double deadline_s) {
     const double now_s = cell_.clock.now_s();
     if (is_robot_there && is_table_there) {
       const double known_s = std::max(robot.in_position_since_s, table.in_position_since_s);
-      const bool is_known = robot.in_position_since_s > 0 && table.in_position_since_s > 0 && known_s <= now_s;
+      const bool is_known =
+          robot.in_position_since_s > 0 && table.in_position_since_s > 0 && known_s <= now_s;
       idle_since_s_ = is_known ? std::max(known_s, idle_since_s_) : now_s;
       return;
     }
@@ -350,8 +358,8 @@ void Run::check_in_place(const char* when) {
     throw DriverError(std::string("the table left its position ") + when + " a pulse");
 }
 
-/// When a condition of the pulse is lost, the laser is turned off at once, whichever device gates it: a robot in alarm
-/// may have forgotten when the pulse was to end.
+/// When a condition of the pulse is lost, the laser is turned off at once, whichever device gates it: a robot
+/// in alarm may have forgotten when the pulse was to end.
 void Run::check_pulse_conditions(const Laser::Status& laser) {
   if (!laser.interlock_closed) throw DriverError("the interlock was opened during a pulse");
   check_in_place("during");
@@ -391,8 +399,8 @@ void Run::prepare_chain(AxisGroup<N>& chain, const typename AxisGroup<N>::Positi
   prepare(program_.exposures[next].joints);
 }
 
-/// While the pulse is on nothing moves, but the next targets can be sent already. Hints only: the move itself reports
-/// what is wrong with them.
+/// While the pulse is on nothing moves, but the next targets can be sent already. Hints only: the move itself
+/// reports what is wrong with them.
 void Run::prepare_next(std::size_t i) {
   if (i + 1 >= program_.exposures.size() || journal_.state(i + 1) != ExposureState::kRemaining) return;
   try {
@@ -419,15 +427,17 @@ void Run::expose(std::size_t i) {
     prepare_next(i);
     wait_pulse_end(fired_s, exposure);
     verify_laser_off();
-    // A stop sets the flag before it cuts the pulse, so a flag that is still clear here means that the pulse was whole.
+    // A stop sets the flag before it cuts the pulse, so a flag that is still clear here means that the pulse
+    // was whole.
     end_if_asked();
-    // The device that gates the laser may have failed and cut the pulse, and an axis may have left its position unseen.
+    // The device that gates the laser may have failed and cut the pulse, and an axis may have left its
+    // position unseen.
     wait_for_fresh_status();
     const auto after = cell_.laser.status();
     check_pulse_conditions(after);
     if (after.state != DeviceState::kReady)
-      throw DriverError(std::string("the laser went to state ") + device_state_name(after.state) + " during a pulse" +
-                        (after.fault.empty() ? "" : ": " + after.fault));
+      throw DriverError(std::string("the laser went to state ") + device_state_name(after.state) +
+                        " during a pulse" + (after.fault.empty() ? "" : ": " + after.fault));
   } catch (...) {
     cell_.laser.off();
     journal_.mark_in_doubt(i);

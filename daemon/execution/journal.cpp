@@ -20,8 +20,8 @@ constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kCountMax = std::size_t{1} << 32;  ///< dot indices are 32 bits wide
 constexpr std::size_t kNoWindow = std::numeric_limits<std::size_t>::max();
 
-/// Written once, when the journal is made. Native byte order: a journal never leaves its machine, and a foreign one
-/// fails its checksum.
+/// Written once, when the journal is made. Native byte order: a journal never leaves its machine, and a
+/// foreign one fails its checksum.
 struct Header {
   char magic[8];
   std::uint32_t version;
@@ -39,8 +39,8 @@ constexpr std::size_t kBootOffset = kPage;
 constexpr std::size_t kTables = 2 * kPage;
 static_assert(sizeof(Header) <= kPage && sizeof(Boot) <= kPage);
 
-/// A record: the state in the low byte, 56 bits of checksum over state, index and table above it. All-zero storage is
-/// not a valid record.
+/// A record: the state in the low byte, 56 bits of checksum over state, index and table above it. All-zero
+/// storage is not a valid record.
 std::uint64_t make_record(std::uint64_t table_seed, std::size_t index, std::uint8_t state) {
   return (splitmix64(splitmix64(table_seed ^ index) + state) << 8 | state);
 }
@@ -122,12 +122,14 @@ struct Journal::Implementation {
 
   ExposureState get(std::size_t i) const {
     const auto state = record_state(kExposureSeed, i, records[i]);
-    return state && *state <= static_cast<std::uint8_t>(ExposureState::kInDoubt) ? static_cast<ExposureState>(*state)
-                                                                                 : ExposureState::kInDoubt;
+    return state && *state <= static_cast<std::uint8_t>(ExposureState::kInDoubt)
+               ? static_cast<ExposureState>(*state)
+               : ExposureState::kInDoubt;
   }
 
   void refuse_if_broken() const {
-    if (is_broken) throw std::runtime_error("the journal could not be synced to disk before: the job must be resumed");
+    if (is_broken)
+      throw std::runtime_error("the journal could not be synced to disk before: the job must be resumed");
   }
   void sync() {
     if (!storage) return;
@@ -181,7 +183,9 @@ void Journal::Implementation::fill() {
 }
 
 void Journal::Implementation::load(const std::string& program_sha256) {
-  const auto refuse = [](const char* sentence) { throw std::runtime_error(std::string("the journal ") + sentence); };
+  const auto refuse = [](const char* sentence) {
+    throw std::runtime_error(std::string("the journal ") + sentence);
+  };
   Header header{};
   if (storage->size() < kTables) refuse("is not a journal: it is too short");
   storage->read(0, bytes_of(header));
@@ -198,13 +202,14 @@ void Journal::Implementation::load(const std::string& program_sha256) {
   storage->read(records_offset(count), bytes_of(records));
 }
 
-/// After a kill the storage is as it was: only what was armed is in doubt. After a power cut an open window's dots may
-/// have been exposed without a trace. Everything is written again, because pages that an earlier sync failed to write
-/// count as clean in the system's cache.
+/// After a kill the storage is as it was: only what was armed is in doubt. After a power cut an open window's
+/// dots may have been exposed without a trace. Everything is written again, because pages that an earlier
+/// sync failed to write count as clean in the system's cache.
 void Journal::Implementation::recover(const std::string& boot_id) {
   Boot boot{};
   storage->read(kBootOffset, bytes_of(boot));
-  const bool is_same_boot = !boot_id.empty() && boot.checksum == block_checksum(boot) && field_text(boot.id) == boot_id;
+  const bool is_same_boot =
+      !boot_id.empty() && boot.checksum == block_checksum(boot) && field_text(boot.id) == boot_id;
   for (std::size_t i = 0; i < count; ++i) {
     const bool is_closed = record_state(kWindowSeed, i / kWindow, windows[i / kWindow]) == kClosed;
     auto state = get(i);
@@ -221,7 +226,8 @@ void Journal::Implementation::recover(const std::string& boot_id) {
   sync();
 }
 
-Journal::Journal(std::unique_ptr<Implementation> implementation) : implementation_(std::move(implementation)) {}
+Journal::Journal(std::unique_ptr<Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
 Journal::Journal(Journal&&) noexcept = default;
 Journal::~Journal() {
   if (!implementation_) return;
@@ -351,7 +357,8 @@ std::size_t Journal::done_count() const {
 std::vector<std::size_t> Journal::in_doubt() const {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < implementation_->count; ++i)
-    if (const auto state = implementation_->get(i); state == ExposureState::kInDoubt || state == ExposureState::kArmed)
+    if (const auto state = implementation_->get(i);
+        state == ExposureState::kInDoubt || state == ExposureState::kArmed)
       found.push_back(i);
   return found;
 }

@@ -8,17 +8,18 @@
 
 #include "daemon/execution/journal_storage.h"
 
-/// Which exposures are done: the record of a painting job that must survive everything (no dot is exposed twice).
+/// Which exposures are done: the record of a painting job that must survive everything (no dot is exposed
+/// twice).
 ///
-/// Storage: a header page (magic, version, count, program), a page with the machine's boot id, one 8-byte record a
-/// window, one 8-byte record an exposure; every record carries a checksum over its state and index. Written in full
-/// before the job starts, so that a full disk is found before the first dot. Afterwards each change is one write to the
-/// system before what it announces happens: a killed process leaves every record whole, and at most one exposure armed.
-/// Before the first exposure of a window of kWindow is armed, the window's opening is synced to disk; a window is
-/// closed only after its records are. So after a power cut (the boot id has changed), whichever of the writes since the
-/// last sync were lost or torn, one window is open whose exposures without a durable *done* are in doubt: at most
-/// kWindow. A record whose checksum is wrong is in doubt, too. One thread at a time; one process at a time (the file is
-/// locked).
+/// Storage: a header page (magic, version, count, program), a page with the machine's boot id, one 8-byte
+/// record a window, one 8-byte record an exposure; every record carries a checksum over its state and index.
+/// Written in full before the job starts, so that a full disk is found before the first dot. Afterwards each
+/// change is one write to the system before what it announces happens: a killed process leaves every record
+/// whole, and at most one exposure armed. Before the first exposure of a window of kWindow is armed, the
+/// window's opening is synced to disk; a window is closed only after its records are. So after a power cut
+/// (the boot id has changed), whichever of the writes since the last sync were lost or torn, one window is
+/// open whose exposures without a durable *done* are in doubt: at most kWindow. A record whose checksum is
+/// wrong is in doubt, too. One thread at a time; one process at a time (the file is locked).
 namespace hilbrush {
 
 enum class ExposureState : std::uint8_t { kRemaining = 0, kArmed = 1, kDone = 2, kInDoubt = 3 };
@@ -30,13 +31,13 @@ class Journal {
 
   /// For dry runs: nothing is kept.
   static Journal in_memory(std::size_t exposure_count);
-  /// The file appears under its name only when it is whole. @throws std::runtime_error naming the file (exists already,
-  /// disk full, ...).
+  /// The file appears under its name only when it is whole. @throws std::runtime_error naming the file
+  /// (exists already, disk full, ...).
   static Journal create(const std::filesystem::path& file, std::size_t exposure_count,
                         const std::string& program_sha256);
-  /// Reopens after a stop, kill or power cut: armed exposures become in doubt. `boot_id` identifies this run of the
-  /// machine; tests pass another one to simulate a power cut. @throws std::runtime_error if it cannot be read, is in
-  /// use, is damaged in its header, or is of another program.
+  /// Reopens after a stop, kill or power cut: armed exposures become in doubt. `boot_id` identifies this run
+  /// of the machine; tests pass another one to simulate a power cut. @throws std::runtime_error if it cannot
+  /// be read, is in use, is damaged in its header, or is of another program.
   static Journal open(const std::filesystem::path& file, const std::string& program_sha256,
                       const std::string& boot_id = current_boot_id());
   /// The same on any storage: of bytes_for() bytes, or what create() has written before.
@@ -51,8 +52,8 @@ class Journal {
   ~Journal();
   Journal(Journal&&) noexcept;
 
-  /// Opens the exposure's window on disk if it is not open yet, so that arm() need not wait for the disk: called while
-  /// the axes move. @throws std::runtime_error
+  /// Opens the exposure's window on disk if it is not open yet, so that arm() need not wait for the disk:
+  /// called while the axes move. @throws std::runtime_error
   void open_window_for(std::size_t i);
   /// The exposure must be kRemaining: no dot is ever exposed twice. @throws
   /// std::runtime_error if it cannot be written or synced; then nothing may be exposed.

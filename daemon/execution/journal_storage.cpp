@@ -24,8 +24,8 @@ namespace fs = std::filesystem;
   fail(file, what + ": " + std::strerror(errno));
 }
 
-/// A process that was forked a moment ago shares our locks until it executes its program or dies: a lock is given a
-/// second to become free.
+/// A process that was forked a moment ago shares our locks until it executes its program or dies: a lock is
+/// given a second to become free.
 bool lock_exclusively(int fd) {
   for (int attempt = 0; attempt < 100; ++attempt) {
     if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return true;

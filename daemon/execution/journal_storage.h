@@ -5,9 +5,10 @@
 #include <memory>
 #include <span>
 
-/// The bytes that a journal is kept in. The journal's promises rest on two of this interface: what write() has taken
-/// survives the death of the process, and what sync() has taken survives a power cut; of what was written since, any
-/// part may be lost or torn. Tests use storages that lose as much as is allowed. One thread.
+/// The bytes that a journal is kept in. The journal's promises rest on two of this interface: what write()
+/// has taken survives the death of the process, and what sync() has taken survives a power cut; of what was
+/// written since, any part may be lost or torn. Tests use storages that lose as much as is allowed. One
+/// thread.
 namespace hilbrush {
 
 class JournalStorage {
@@ -22,12 +23,12 @@ class JournalStorage {
   virtual void sync() = 0;
 };
 
-/// A file, held by one process at a time. It is written by system calls, not through a mapping: a full disk is then an
-/// error before the dot instead of a signal in it, on file systems that copy on write, too.
+/// A file, held by one process at a time. It is written by system calls, not through a mapping: a full disk
+/// is then an error before the dot instead of a signal in it, on file systems that copy on write, too.
 class JournalFile final : public JournalStorage {
  public:
-  /// A file of `bytes` zeroes for which the disk has room. It appears under its name, which must be free, by publish()
-  /// only. @throws std::runtime_error naming the file.
+  /// A file of `bytes` zeroes for which the disk has room. It appears under its name, which must be free, by
+  /// publish() only. @throws std::runtime_error naming the file.
   static std::unique_ptr<JournalFile> create(const std::filesystem::path& file, std::size_t bytes);
   /// @throws std::runtime_error naming the file, also if another process holds it.
   static std::unique_ptr<JournalFile> open(const std::filesystem::path& file);

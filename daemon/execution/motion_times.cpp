@@ -35,7 +35,8 @@ void MotionTimes::add(const CellDescription& cell, const Joints& from, const Joi
   }
   if (promised_s <= 0) return;
   // Axes are seen to arrive with the control tick; which is not their fault.
-  if (cell.timing.tick_s > 0) promised_s = std::ceil(promised_s / cell.timing.tick_s - 1e-9) * cell.timing.tick_s;
+  if (cell.timing.tick_s > 0)
+    promised_s = std::ceil(promised_s / cell.timing.tick_s - 1e-9) * cell.timing.tick_s;
   Sums& sums = axes_[slowest];
   ++sums.moves;
   sums.promised += promised_s;
@@ -80,7 +81,8 @@ std::optional<MeasuredMotion> MotionTimes::measured() const {
   for (std::size_t i = 0; i < kAxisCount; ++i) motion.moves[i] = axes_[i].moves;
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (axes_[i].moves >= kMovesOfAxisLeast)
-      motion.time_factor[i] = (axes_[i].product - motion.move_delay_s * axes_[i].promised) / axes_[i].promised2;
+      motion.time_factor[i] =
+          (axes_[i].product - motion.move_delay_s * axes_[i].promised) / axes_[i].promised2;
   return motion;
 }
 

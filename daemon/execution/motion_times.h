@@ -16,8 +16,8 @@ struct MeasuredMotion {
   std::array<std::optional<double>, kAxisCount> time_factor;  ///< of axes that were the slowest often enough
   std::array<std::uint64_t, kAxisCount> moves{};              ///< from which each factor is
 
-  /// The times of moves scatter by about a fifth about the best line, by settling and control ticks: a factor from this
-  /// many is good to one percent.
+  /// The times of moves scatter by about a fifth about the best line, by settling and control ticks: a factor
+  /// from this many is good to one percent.
   static constexpr std::uint64_t kMovesEnough = 400;
   /// Whether every factor may go into a cell file.
   bool is_enough() const;
@@ -25,7 +25,8 @@ struct MeasuredMotion {
 
 class MotionTimes {
  public:
-  /// A move from rest to rest that was over `seconds` after it was ordered, the settling that was ordered not counted.
+  /// A move from rest to rest that was over `seconds` after it was ordered, the settling that was ordered not
+  /// counted.
   void add(const CellDescription& cell, const Joints& from, const Joints& to, double seconds);
   void add(const MotionTimes& other);
   std::uint64_t count() const;

@@ -37,8 +37,9 @@ void check_pose(const CellDescription& cell, const Joints& target, std::size_t e
     const auto& limits = cell.axes[axis];
     if (is_within(limits, target[axis])) continue;
     throw ProgramRefused("the program asks axis " + std::string(kAxisNames[axis]) + " for " +
-                         millimeters_or_degrees(axis, target[axis]) + " at exposure " + std::to_string(exposure) +
-                         ", outside its limits " + millimeters_or_degrees(axis, limits.min) + " to " +
+                         millimeters_or_degrees(axis, target[axis]) + " at exposure " +
+                         std::to_string(exposure) + ", outside its limits " +
+                         millimeters_or_degrees(axis, limits.min) + " to " +
                          millimeters_or_degrees(axis, limits.max));
   }
 }

@@ -5,7 +5,8 @@
 #include "drivers/laser.h"
 #include "planner/cell_model/exposure_program.h"
 
-/// Limits that are checked again just before they matter, independently of the planner. Pure functions, any thread.
+/// Limits that are checked again just before they matter, independently of the planner. Pure functions, any
+/// thread.
 namespace hilbrush {
 
 /// The program asks for something outside the limits: no device is at fault.

@@ -21,7 +21,8 @@ double pitch_of(const JobSettings& settings) {
   return 25.4e-3 / settings.dpi.value_or(kDefaultDpi);
 }
 
-ToneCurve simulated_curve(const CellDescription& cell, const JobSettings& settings, const PictureOptions& options) {
+ToneCurve simulated_curve(const CellDescription& cell, const JobSettings& settings,
+                          const PictureOptions& options) {
   const Wedge wedge = wedge_on_film(cell, pitch_of(settings), options);
   if (options.levels.size() == 1) return calibrate_tone(wedge, cell.paint.asked_max);
   constexpr int kSteps = 64;
@@ -31,8 +32,8 @@ ToneCurve simulated_curve(const CellDescription& cell, const JobSettings& settin
                        options.levels);
 }
 
-ToneCurve measured_curve(const CellDescription& cell, const JobSettings& settings, const PictureOptions& options,
-                         const std::filesystem::path& measured) {
+ToneCurve measured_curve(const CellDescription& cell, const JobSettings& settings,
+                         const PictureOptions& options, const std::filesystem::path& measured) {
   const std::vector<WedgeStep> steps = read_wedge_form(measured, settings, cell);
   try {
     return tone_curve_of(steps, cell.paint.asked_max, options.levels);
@@ -47,12 +48,13 @@ std::string curve_entry(const ToneCurve& curve, const JobSettings& settings, con
     return values;
   };
   const double pitch_m = pitch_of(settings);
-  const nlohmann::ordered_json entry{{"sampler", sampler_name(settings.sampler)},
-                                     {"curve", curve_name(settings.curve)},
-                                     {"levels", settings.levels},
-                                     {"spot_pitches", std::round(spot_diameter_m(cell, pitch_m) / pitch_m * 1e4) / 1e4},
-                                     {"wanted", rounded(curve.wanted)},
-                                     {"asked", rounded(curve.asked)}};
+  const nlohmann::ordered_json entry{
+      {"sampler", sampler_name(settings.sampler)},
+      {"curve", curve_name(settings.curve)},
+      {"levels", settings.levels},
+      {"spot_pitches", std::round(spot_diameter_m(cell, pitch_m) / pitch_m * 1e4) / 1e4},
+      {"wanted", rounded(curve.wanted)},
+      {"asked", rounded(curve.asked)}};
   return entry.dump(2) + "\n";
 }
 
@@ -63,8 +65,9 @@ std::string run_calibrate(const PipelineRequest& request, const std::filesystem:
   make_output_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   if (calibrated_sampler(request.settings.sampler) != request.settings.sampler)
-    throw InputError("sampler", std::string(sampler_name(request.settings.sampler)) + " uses the tone curve of " +
-                                    sampler_name(calibrated_sampler(request.settings.sampler)) + ": calibrate that");
+    throw InputError("sampler",
+                     std::string(sampler_name(request.settings.sampler)) + " uses the tone curve of " +
+                         sampler_name(calibrated_sampler(request.settings.sampler)) + ": calibrate that");
   if (listener.on_progress) listener.on_progress("paint", 0);
   const PictureOptions options = picture_options(cell, request.settings);
   const ToneCurve curve = measured.empty() ? simulated_curve(cell, request.settings, options)
@@ -78,8 +81,8 @@ std::string run_wedge(const PipelineRequest& request) {
   make_output_folder(request.output);
   const CellDescription cell = load_cell(request.cell_file);
   const JobSettings settings = wedge_settings(request.settings);
-  const WedgeCard card =
-      wedge_card(pitch_of(settings), cell.paint.asked_max, energy_levels(settings.levels, cell.paint.asked_max));
+  const WedgeCard card = wedge_card(pitch_of(settings), cell.paint.asked_max,
+                                    energy_levels(settings.levels, cell.paint.asked_max));
   write_text_file(request.output / "wedge.wrl", wedge_model(card, cell.paint));
   write_text_file(request.output / "wedge.json", job_settings_to_json(settings) + "\n");
   write_text_file(request.output / "wedge_steps.json", wedge_form(card, settings));

@@ -15,16 +15,16 @@ constexpr double kBytesPerDot = 512;
 /// Programs and films number dots with 32 bits.
 constexpr std::uint64_t kMaxDots = std::numeric_limits<std::uint32_t>::max();
 
-/// The pitch before the dots are placed. For a job that gives the number of dots it is estimated as if the tone were
-/// one half everywhere. It chooses the tone curve, on cells whose spot is given in millimeters.
+/// The pitch before the dots are placed. For a job that gives the number of dots it is estimated as if the
+/// tone were one half everywhere. It chooses the tone curve, on cells whose spot is given in millimeters.
 double expected_pitch_m(const JobSettings& settings, const TexturedMesh& mesh) {
   const SampleOptions options = sample_options(settings);
   if (options.pitch_m) return *options.pitch_m;
   return std::sqrt(.5 * mesh.area_m2() / static_cast<double>(*options.dot_count));
 }
 
-/// The pitch that this number of dots has, within a few hundredths: what is asked for below a pitch depends on it, a
-/// little, and it on what is asked for.
+/// The pitch that this number of dots has, within a few hundredths: what is asked for below a pitch depends
+/// on it, a little, and it on what is asked for.
 double pitch_of_count(const TexturedMesh& mesh, ToneOptions options, const std::vector<double>& levels,
                       std::uint64_t count, double first_guess_m) {
   constexpr int kMaxTrials = 3;
@@ -61,8 +61,8 @@ CellTone job_tone(const CellDescription& cell, const JobSettings& settings, cons
   }
   tone.options.pitch_m = pitch_m;
   if (settings.dots)
-    tone.options.pitch_m = pitch_of_count(mesh, tone.options, energy_levels(settings.levels, cell.paint.asked_max),
-                                          *settings.dots, pitch_m);
+    tone.options.pitch_m = pitch_of_count(
+        mesh, tone.options, energy_levels(settings.levels, cell.paint.asked_max), *settings.dots, pitch_m);
   return tone;
 }
 
@@ -96,7 +96,8 @@ std::uint64_t dot_limit_by_memory() {
   double kilobytes = 0;
   while (in >> key >> kilobytes) {
     if (key == "MemAvailable:")
-      return static_cast<std::uint64_t>(std::min(kilobytes * 1024 / kBytesPerDot, static_cast<double>(kMaxDots)));
+      return static_cast<std::uint64_t>(
+          std::min(kilobytes * 1024 / kBytesPerDot, static_cast<double>(kMaxDots)));
     std::getline(in, unit);
   }
   return kMaxDots;

@@ -10,12 +10,12 @@
 /// From the settings of a job to the options of sampling.
 namespace hilbrush {
 
-/// Paint and tone curve of this job on this cell. `mesh` gives the pitch of a job whose settings give the number of
-/// dots.
+/// Paint and tone curve of this job on this cell. `mesh` gives the pitch of a job whose settings give the
+/// number of dots.
 CellTone job_tone(const CellDescription& cell, const JobSettings& settings, const TexturedMesh& mesh);
 
-/// The sampler whose tone curve `sampler` uses. "fine" uses that of "centroid": it starts from its dots, and on uniform
-/// tone it does not move them.
+/// The sampler whose tone curve `sampler` uses. "fine" uses that of "centroid": it starts from its dots, and
+/// on uniform tone it does not move them.
 Sampler calibrated_sampler(Sampler sampler);
 
 /// Where the model of this job stands, and its scale.

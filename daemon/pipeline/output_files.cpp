@@ -20,7 +20,9 @@ void write_text_file(const std::filesystem::path& file, const std::string& text)
     std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
     out << text;
     out.flush();
-    if (!out) throw InputError(file.string(), "cannot be written (no such folder, no permission, or the disk is full)");
+    if (!out)
+      throw InputError(file.string(),
+                       "cannot be written (no such folder, no permission, or the disk is full)");
   }
   std::error_code error;
   std::filesystem::rename(temporary, file, error);

@@ -11,8 +11,8 @@
 namespace hilbrush {
 namespace {
 
-/// Real axes stop beside their targets, anywhere in the window in which they report to be in position. Dots are farther
-/// apart than that, so the nearest exposure is the commanded one. In radians and meters.
+/// Real axes stop beside their targets, anywhere in the window in which they report to be in position. Dots
+/// are farther apart than that, so the nearest exposure is the commanded one. In radians and meters.
 constexpr double kAngleTolerance = 5e-4;
 constexpr double kTravelToleranceM = 5e-5;
 constexpr double kOffTargetM = 10e-6;
@@ -33,7 +33,8 @@ double distance_of(const Joints& a, const Joints& b) {
 /// Finds exposures by their joints. Sorted by J1, which differs between nearly all of them.
 class ExposureIndex {
  public:
-  explicit ExposureIndex(const ExposureProgram& program) : program_(program), order_(program.exposures.size()) {
+  explicit ExposureIndex(const ExposureProgram& program)
+      : program_(program), order_(program.exposures.size()) {
     std::iota(order_.begin(), order_.end(), std::size_t{0});
     std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return j1(a) < j1(b); });
   }

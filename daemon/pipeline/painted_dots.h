@@ -7,8 +7,8 @@
 #include "sim/devices/emission_record.h"
 #include "sim/film/film.h"
 
-/// Which exposures of a program were really made, by the record of the simulated laser. The reported counts come from
-/// this record, not from the program.
+/// Which exposures of a program were really made, by the record of the simulated laser. The reported counts
+/// come from this record, not from the program.
 namespace hilbrush {
 
 struct PaintedDots {
@@ -19,9 +19,9 @@ struct PaintedDots {
   HitFigures hits;             ///< of the emissions that match one
 };
 
-/// Matches each emission, in any order, to the exposure with the nearest joints, within the in-position windows of real
-/// axes (half a milliradian, 50 micrometers). Cost O(n log n), and for each emission the number of exposures within
-/// half a milliradian of its J1.
+/// Matches each emission, in any order, to the exposure with the nearest joints, within the in-position
+/// windows of real axes (half a milliradian, 50 micrometers). Cost O(n log n), and for each emission the
+/// number of exposures within half a milliradian of its J1.
 PaintedDots match_emissions(const ExposureProgram& program, std::span<const Emission> emissions,
                             std::span<const Hit> hits);
 

@@ -52,7 +52,8 @@ class Stages {
     const auto begin = std::chrono::steady_clock::now();
     report_progress(stage, 0);
     auto result = work([this, stage](double fraction) { report_progress(stage, fraction); });
-    seconds_.emplace_back(stage, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    seconds_.emplace_back(stage,
+                          std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     return result;
   }
   void warn(const std::string& sentence) const {
@@ -76,12 +77,14 @@ std::string hash_of_files(const std::vector<std::filesystem::path>& files) {
   return hash.hex_digest();
 }
 
-/// The object on the table: what later stages read but never change. Members refer to each other, so it is not moved.
+/// The object on the table: what later stages read but never change. Members refer to each other, so it is
+/// not moved.
 struct Workpiece {
   Workpiece(const PipelineRequest& request, Stages& stages)
       : cell(with_fixture(load_cell(request.cell_file), mounting_options(request.settings))),
         settings(request.settings) {
-    Model model = stages.run("load", [&](const Progress&) { return load_model(request.model, load_image_file); });
+    Model model =
+        stages.run("load", [&](const Progress&) { return load_model(request.model, load_image_file); });
     report.mesh.file = request.model.filename().string();
     report.mesh.warnings = model.warnings;
     report.settings_json = job_settings_to_json(settings);
@@ -90,7 +93,8 @@ struct Workpiece {
     provenance = {hash_of_files(model.files), job_settings_sha256(settings), cell.sha256, HILBRUSH_VERSION};
 
     auto repaired = stages.run("disk", [&](const Progress&) {
-      return repair_mesh(mounted(place_on_table(model, placement_options(settings)), mounting_options(settings)));
+      return repair_mesh(
+          mounted(place_on_table(model, placement_options(settings)), mounting_options(settings)));
     });
     mesh = with_curvature_density(std::move(repaired.mesh), settings.density);
     report.mesh.repairs = std::move(repaired.repairs);
@@ -146,7 +150,8 @@ void refuse_faulty_program(const std::vector<ProgramFault>& faults) {
 DotSequence sample_dots(Workpiece& piece, Stages& stages) {
   const auto curve = stages.run("curve", [&](const Progress& progress) {
     // Laminar slices need no curve, but the report's figures about the surface come from one.
-    const CurveKind kind = piece.settings.curve == CurveKind::kLaminar ? CurveKind::kHilbert : piece.settings.curve;
+    const CurveKind kind =
+        piece.settings.curve == CurveKind::kLaminar ? CurveKind::kHilbert : piece.settings.curve;
     return std::make_unique<SurfaceCurve>(piece.mesh, kind, progress);
   });
   piece.report.mesh.components = curve->components();
@@ -176,13 +181,15 @@ void warn_of_skipped(Report& report, const Stages& stages) {
   stages.warn(report.mesh.warnings.back());
 }
 
-PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesystem::path& output, Stages& stages) {
+PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesystem::path& output,
+                      Stages& stages) {
   PlannedWork work;
   work.dots = sample_dots(piece, stages);
   Report& report = piece.report;
   report.pitch_m = work.dots.pitch_m;
 
-  work.plan = stages.run("plan", [&](const Progress& progress) { return plan_exposures(reach, work.dots, progress); });
+  work.plan = stages.run(
+      "plan", [&](const Progress& progress) { return plan_exposures(reach, work.dots, progress); });
   work.plan.program.provenance = piece.provenance;
   refuse_faulty_program(stages.run("check", [&](const Progress& progress) {
     return check_program(work.plan.program, work.plan.skipped, work.dots, piece.mesh, piece.cell,
@@ -195,8 +202,9 @@ PlannedWork plan_work(Workpiece& piece, const Reach& reach, const std::filesyste
   for (const auto& skipped : work.plan.skipped) ++report.dots.skipped[skip_reason_name(skipped.reason)];
   report.skipped = skipped_figures(work.plan.skipped);
   warn_of_skipped(report, stages);
-  report.advice = advise_mounting(piece.mesh, piece.cell, {mounting_options(piece.settings), piece.up},
-                                  plan_options(piece.settings), work.dots, work.plan.skipped, piece.settings.seed);
+  report.advice =
+      advise_mounting(piece.mesh, piece.cell, {mounting_options(piece.settings), piece.up},
+                      plan_options(piece.settings), work.dots, work.plan.skipped, piece.settings.seed);
   report.incidence = incidence_figures(work.plan.program);
   report.motion = motion_figures(work.plan.program);
   report.time = work.plan.time;
@@ -226,8 +234,9 @@ std::vector<Emission> paint_in_simulation(const ExposureProgram& program, CellDe
   std::vector<Joints> approach;  // from home, as the program has it
   for (const Via& via : program.vias_before(0)) approach.push_back(via.joints);
   const auto total = static_cast<double>(std::max<std::size_t>(program.exposures.size(), 1));
-  const ExecutionResult result = execute(program, approach, cell, description, journal, control,
-                                         [&](std::size_t done) { progress(static_cast<double>(done) / total); });
+  const ExecutionResult result =
+      execute(program, approach, cell, description, journal, control,
+              [&](std::size_t done) { progress(static_cast<double>(done) / total); });
   cell.laser.disable();
   if (result.outcome != ExecutionOutcome::kFinished)
     throw std::logic_error("the simulated cell did not finish the program: " + result.reason);
@@ -246,11 +255,13 @@ std::vector<Eigen::Vector3d> positions_of_unexposed(const DotSequence& dots, con
 
 /// Film, fidelity and pictures from the recorded emissions; completes the report.
 void develop_and_judge(Workpiece& piece, const Reach& reach, const PlannedWork& work,
-                       std::span<const Emission> emissions, const std::filesystem::path& output, Stages& stages) {
+                       std::span<const Emission> emissions, const std::filesystem::path& output,
+                       Stages& stages) {
   Report& report = piece.report;
   const ExposureProgram& program = work.plan.program;
   Film film(piece.mesh, piece.cell, program.pitch_m);
-  const auto hits = stages.run("paint", [&](const Progress& progress) { return film.expose(emissions, progress); });
+  const auto hits =
+      stages.run("paint", [&](const Progress& progress) { return film.expose(emissions, progress); });
 
   const PaintedDots painted = match_emissions(program, emissions, hits);
   report.dots.exposed = painted.exposed;
@@ -261,14 +272,17 @@ void develop_and_judge(Workpiece& piece, const Reach& reach, const PlannedWork& 
     report.mesh.warnings.push_back(std::to_string(painted.foreign) +
                                    " recorded emissions belong to no exposure of the program");
   if (painted.repeated > 0)
-    report.mesh.warnings.push_back(std::to_string(painted.repeated) + " exposures were emitted more than once");
+    report.mesh.warnings.push_back(std::to_string(painted.repeated) +
+                                   " exposures were emitted more than once");
 
   const auto files = stages.run("images", [&](const Progress& progress) {
     const ReachTest is_reachable = [&](const SurfacePoint& point) {
       return reach.is_reachable(position(piece.mesh, point), face_normal(piece.mesh, point));
     };
-    report.fidelity = measure_fidelity(film, *piece.tone, is_reachable, piece.settings.seed, progress.part(0, .5));
-    return write_pictures(film, *piece.tone, positions_of_unexposed(work.dots, program), output, progress.part(.5, 1));
+    report.fidelity =
+        measure_fidelity(film, *piece.tone, is_reachable, piece.settings.seed, progress.part(0, .5));
+    return write_pictures(film, *piece.tone, positions_of_unexposed(work.dots, program), output,
+                          progress.part(.5, 1));
   });
   for (const auto& file : files) report.files.push_back(std::filesystem::relative(file, output).string());
 }
@@ -295,7 +309,8 @@ ExposureProgram read_own_program(const Workpiece& piece, const std::filesystem::
   ExposureProgram program = read_program(file);
   const std::string mismatch = provenance_mismatch(program.provenance, piece.provenance);
   if (!mismatch.empty())
-    throw InputError(file.string(), "was made for " + mismatch + "; it is not run or developed with this one");
+    throw InputError(file.string(),
+                     "was made for " + mismatch + "; it is not run or developed with this one");
   return program;
 }
 
@@ -334,7 +349,8 @@ std::string run_develop(const PipelineRequest& request, const std::filesystem::p
   piece.report.skipped = skipped_figures_from_report(program_file.parent_path() / "report.json");
   const auto emissions = read_given_record(emissions_file);
 
-  // Sampling is deterministic: placing the dots again, instead of reading them, completes the report of the mesh too.
+  // Sampling is deterministic: placing the dots again, instead of reading them, completes the report of the
+  // mesh too.
   work.dots = sample_dots(piece, stages);
   piece.report.dots = planned;
   piece.report.pitch_m = work.plan.program.pitch_m;

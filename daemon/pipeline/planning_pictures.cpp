@@ -48,7 +48,8 @@ Color ramp(std::span<const Color> colors, double share) {
   const double between = position - static_cast<double>(i);
   Color color;
   for (std::size_t k = 0; k < color.size(); ++k)
-    color[k] = static_cast<std::uint8_t>(std::lround(colors[i][k] + (colors[i + 1][k] - colors[i][k]) * between));
+    color[k] =
+        static_cast<std::uint8_t>(std::lround(colors[i][k] + (colors[i + 1][k] - colors[i][k]) * between));
   return color;
 }
 
@@ -59,8 +60,8 @@ Color incidence_color(double incidence) {
   return ramp(kColors, incidence / (45 * kDegree));
 }
 
-/// From the first exposure (violet) to the last (yellow). The hues are far enough apart that only exposures near in
-/// time look alike.
+/// From the first exposure (violet) to the last (yellow). The hues are far enough apart that only exposures
+/// near in time look alike.
 Color order_color(double share) {
   constexpr std::array<Color, 6> kColors{
       {{70, 10, 120}, {50, 70, 200}, {20, 150, 190}, {40, 180, 90}, {170, 205, 50}, {250, 230, 30}}};
@@ -155,7 +156,8 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan, bool has_b
   if (row == kReach) {
     std::array<std::size_t, kReasonColors.size()> counts{};
     for (const SkippedDot& skipped : plan.skipped) ++counts[static_cast<std::size_t>(skipped.reason)];
-    write_legend_entry(canvas, left, top, kExposed, std::to_string(plan.program.exposures.size()) + " exposed");
+    write_legend_entry(canvas, left, top, kExposed,
+                       std::to_string(plan.program.exposures.size()) + " exposed");
     for (std::size_t r = 0; r < counts.size(); ++r)
       if (counts[r] > 0)
         write_legend_entry(canvas, left, top, kReasonColors[r],
@@ -163,7 +165,8 @@ void write_legend(Canvas& canvas, Row row, int top, const Plan& plan, bool has_b
     if (has_back_faces) write_legend_entry(canvas, left, top, kBackFace, "surface seen from behind");
   } else if (row == kIncidence) {
     for (const int degrees : {0, 10, 20, 30, 40, 45})
-      write_legend_entry(canvas, left, top, incidence_color(degrees * kDegree), std::to_string(degrees) + " deg");
+      write_legend_entry(canvas, left, top, incidence_color(degrees * kDegree),
+                         std::to_string(degrees) + " deg");
   } else {
     write_legend_entry(canvas, left, top, order_color(0), "first");
     write_legend_entry(canvas, left, top, order_color(.5), "half way");
@@ -204,19 +207,22 @@ Plot time_plot(const CellDescription& cell, const ExposureProgram& program) {
   const TimeUnit unit = time_unit(total_s);
   const auto part = [total_s](const char* name, double seconds) {
     const auto percent = static_cast<int>(std::lround(100 * seconds / std::max(total_s, 1e-9)));
-    return PlotSeries{std::string(name) + " " + hours_text(seconds) + ", " + std::to_string(percent) + " %", {}};
+    return PlotSeries{std::string(name) + " " + hours_text(seconds) + ", " + std::to_string(percent) + " %",
+                      {}};
   };
-  std::array<PlotSeries, 5> series{PlotSeries{"in all " + hours_text(total_s), {}}, part("move", total.move_s),
-                                   part("settle", total.settle_s), part("expose", total.expose_s),
-                                   part("retract", total.retract_s)};
+  std::array<PlotSeries, 5> series{PlotSeries{"in all " + hours_text(total_s), {}},
+                                   part("move", total.move_s), part("settle", total.settle_s),
+                                   part("expose", total.expose_s), part("retract", total.retract_s)};
   estimate_time(cell, program, [&](std::size_t exposure, const TimeSplit& so_far) {
     if (exposure % step != 0 && exposure + 1 != program.exposures.size()) return;
     const auto x = static_cast<double>(exposure + 1);
     const std::array<double, 5> seconds{so_far.total_s(), so_far.move_s, so_far.settle_s, so_far.expose_s,
                                         so_far.retract_s};
-    for (std::size_t k = 0; k < series.size(); ++k) series[k].points.emplace_back(x, seconds[k] / unit.seconds);
+    for (std::size_t k = 0; k < series.size(); ++k)
+      series[k].points.emplace_back(x, seconds[k] / unit.seconds);
   });
-  return {"Where the time goes", "exposures", unit.name, false, false, 0., {}, {series.begin(), series.end()}};
+  return {"Where the time goes",         "exposures", unit.name, false, false, 0., {},
+          {series.begin(), series.end()}};
 }
 
 Color skip_reason_color(SkipReason reason) {
@@ -226,7 +232,8 @@ Color skip_reason_color(SkipReason reason) {
 Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const Plan& plan) {
   const auto [low, high] = bounds(mesh);
   const double pixel_m = (high - low).maxCoeff() / kViewPixels;
-  const PlanDrawing drawing{dots, plan, std::clamp(static_cast<int>(dots.pitch_m / pixel_m / 2), 0, kViewPixels / 20)};
+  const PlanDrawing drawing{dots, plan,
+                            std::clamp(static_cast<int>(dots.pitch_m / pixel_m / 2), 0, kViewPixels / 20)};
   std::vector<std::pair<const char*, ViewSheet>> views;
   int width = kPad;
   int height = 0;
@@ -236,8 +243,8 @@ Picture planning_sheet(const TexturedMesh& mesh, const DotSequence& dots, const 
     width += std::max(views.back().second.width(), Canvas::text_width(longest, kScale)) + kPad;
     height = std::max(height, views.back().second.height());
   }
-  const bool has_back_faces =
-      std::any_of(views.begin(), views.end(), [](const auto& view) { return view.second.shows_back_faces(); });
+  const bool has_back_faces = std::any_of(views.begin(), views.end(),
+                                          [](const auto& view) { return view.second.shows_back_faces(); });
   constexpr int kMinWidth = 900;  // pixels, so that the legends fit
   const int row_height = 2 * (kText + kPad) + height + kPad;
   Canvas canvas(std::max(width, kMinWidth), kRowCount * row_height + kPad, kBackground);

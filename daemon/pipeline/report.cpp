@@ -19,7 +19,8 @@ using Json = nlohmann::ordered_json;
 constexpr double kDegreesPerRadian = 1 / kDegree;
 constexpr std::size_t kMaxListedComponents = 32;
 
-/// Rounded to six significant digits, more than the accuracy of any figure. JSON has no infinities: they become null.
+/// Rounded to six significant digits, more than the accuracy of any figure. JSON has no infinities: they
+/// become null.
 Json figure(double value) {
   if (!std::isfinite(value)) return nullptr;
   if (value == 0) return 0.0;
@@ -75,11 +76,13 @@ Json mesh_json(const Report::Mesh& mesh) {
 }
 
 /// The largest components, each with its part of the path.
-Json components_json(const std::vector<ComponentReport>& components, const std::vector<ComponentPath>& paths) {
+Json components_json(const std::vector<ComponentReport>& components,
+                     const std::vector<ComponentPath>& paths) {
   std::vector<std::size_t> order(components.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return components[a].area_m2 > components[b].area_m2; });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return components[a].area_m2 > components[b].area_m2;
+  });
   order.resize(std::min(order.size(), kMaxListedComponents));
   Json list = Json::array();
   for (const std::size_t i : order) {
@@ -124,11 +127,12 @@ Json skipped_json(const std::vector<SkippedFigures>& skipped) {
 }
 
 Json advice_json(const MountingAdvice& advice) {
-  return {{"post_height_mm", advice.post_height_m ? Json(figure(*advice.post_height_m * 1e3)) : Json(nullptr)},
-          {"up", advice.up ? Json(*advice.up == UpAxis::kY ? "y" : "z") : Json(nullptr)},
-          {"reached_now", figure(advice.reached_now)},
-          {"reached_then", figure(advice.reached_then)},
-          {"text", advice_sentence(advice)}};
+  return {
+      {"post_height_mm", advice.post_height_m ? Json(figure(*advice.post_height_m * 1e3)) : Json(nullptr)},
+      {"up", advice.up ? Json(*advice.up == UpAxis::kY ? "y" : "z") : Json(nullptr)},
+      {"reached_now", figure(advice.reached_now)},
+      {"reached_then", figure(advice.reached_then)},
+      {"text", advice_sentence(advice)}};
 }
 
 Json predictive_json(const PredictiveReport& predictive) {
@@ -138,18 +142,24 @@ Json predictive_json(const PredictiveReport& predictive) {
 }
 
 Json fidelity_json(const FidelityFigures& figures) {
-  return {
-      {"f1_db", figure(figures.f1_db)},       {"f2_db", figure(figures.f2_db)},       {"s2", figure(figures.s2)},
-      {"tone_rms", figure(figures.tone_rms)}, {"tone_max", figure(figures.tone_max)}, {"p999", figure(figures.p999)}};
+  return {{"f1_db", figure(figures.f1_db)},
+          {"f2_db", figure(figures.f2_db)},
+          {"s2", figure(figures.s2)},
+          {"tone_rms", figure(figures.tone_rms)},
+          {"tone_max", figure(figures.tone_max)},
+          {"p999", figure(figures.p999)}};
 }
 
 Json incidence_json(const IncidenceFigures& incidence) {
-  return {{"mean", figure(incidence.mean_deg)}, {"p95", figure(incidence.p95_deg)}, {"max", figure(incidence.max_deg)}};
+  return {{"mean", figure(incidence.mean_deg)},
+          {"p95", figure(incidence.p95_deg)},
+          {"max", figure(incidence.max_deg)}};
 }
 
 Json time_json(const TimeSplit& time, double least_time_s) {
-  return {{"move", figure(time.move_s)},       {"settle", figure(time.settle_s)}, {"expose", figure(time.expose_s)},
-          {"retract", figure(time.retract_s)}, {"total", figure(time.total_s())}, {"least", figure(least_time_s)}};
+  return {{"move", figure(time.move_s)},     {"settle", figure(time.settle_s)},
+          {"expose", figure(time.expose_s)}, {"retract", figure(time.retract_s)},
+          {"total", figure(time.total_s())}, {"least", figure(least_time_s)}};
 }
 
 Json motion_json(const MotionFigures& motion) {
@@ -175,7 +185,9 @@ Json fidelity_json(const Fidelity& fidelity) {
 }
 
 Json hits_json(const HitFigures& hits) {
-  return {{"max_error_um", figure(hits.max_error_um)}, {"off_target", hits.off_target}, {"shadowed", hits.shadowed}};
+  return {{"max_error_um", figure(hits.max_error_um)},
+          {"off_target", hits.off_target},
+          {"shadowed", hits.shadowed}};
 }
 
 Json stages_json(const std::vector<std::pair<std::string, double>>& stages_s) {
@@ -211,8 +223,8 @@ IncidenceFigures incidence_figures(const ExposureProgram& program) {
   }
   std::sort(incidences.begin(), incidences.end());
   const std::size_t count = incidences.size();
-  return {sum / static_cast<double>(count) * kDegreesPerRadian, incidences[(count - 1) * 95 / 100] * kDegreesPerRadian,
-          incidences.back() * kDegreesPerRadian};
+  return {sum / static_cast<double>(count) * kDegreesPerRadian,
+          incidences[(count - 1) * 95 / 100] * kDegreesPerRadian, incidences.back() * kDegreesPerRadian};
 }
 
 MotionFigures motion_figures(const ExposureProgram& program) {
@@ -300,7 +312,8 @@ DotCounts dot_counts_from_report(const std::filesystem::path& report_file) {
     DotCounts counts;
     counts.requested = dots.at("requested").get<std::uint64_t>();
     counts.placed = dots.at("placed").get<std::uint64_t>();
-    for (const auto& [reason, count] : dots.at("skipped").items()) counts.skipped[reason] = count.get<std::uint64_t>();
+    for (const auto& [reason, count] : dots.at("skipped").items())
+      counts.skipped[reason] = count.get<std::uint64_t>();
     return counts;
   });
 }

@@ -14,8 +14,8 @@
 #include "sampling/place_picture.h"
 #include "sim/film/fidelity.h"
 
-/// What one run of the pipeline found: report.json, for people and programs. Keys are stable: new ones are added, none
-/// is renamed.
+/// What one run of the pipeline found: report.json, for people and programs. Keys are stable: new ones are
+/// added, none is renamed.
 namespace hilbrush {
 
 /// placed = exposed + in_doubt + remaining + the sum of skipped.

@@ -14,8 +14,8 @@ namespace {
 std::string amounts_text(const SkippedFigures& figures, SkipMeasure measure) {
   const std::string unit = figures.unit == "deg" ? "degrees" : figures.unit;
   if (measure == SkipMeasure::kFreeLength)
-    return ", typically " + amount(figures.typical) + " " + unit + " from the dot, nearest " + amount(figures.worst) +
-           " " + unit;
+    return ", typically " + amount(figures.typical) + " " + unit + " from the dot, nearest " +
+           amount(figures.worst) + " " + unit;
   return ", typically by " + amount(figures.typical) + ", at most by " + amount(figures.worst) + " " + unit;
 }
 

@@ -16,7 +16,7 @@ struct SkippedFigures {
   std::string unit;    ///< of the amounts, "mm" or "deg"; empty: there are none
   double typical = 0;  ///< the median of the amounts
   double worst = 0;    ///< the amount of the dot that is farthest from being reached
-  std::string text;    ///< the whole sentence: "tilt past its limit, typically by 2.1, at most by 5.3 degrees"
+  std::string text;  ///< the whole sentence: "tilt past its limit, typically by 2.1, at most by 5.3 degrees"
 };
 
 /// Sorted by count, most frequent first.

@@ -46,10 +46,13 @@ std::vector<double> lines(int fields, const WedgeCard& card) {
 }
 
 double coverage_of(const JsonObject& json, double reflectance, const CellDescription::Paint& paint) {
-  const double coverage = (paint.reflectance_white - reflectance) / (paint.reflectance_white - paint.reflectance_black);
-  constexpr double kNoise = .05;  // coverage; readings of white and black scatter around the values of the cell file
+  const double coverage =
+      (paint.reflectance_white - reflectance) / (paint.reflectance_white - paint.reflectance_black);
+  constexpr double kNoise =
+      .05;  // coverage; readings of white and black scatter around the values of the cell file
   if (coverage < -kNoise || coverage > 1 + kNoise)
-    json.refuse("reflectance", "is lighter than the paint's reflectance_white or darker than its reflectance_black");
+    json.refuse("reflectance",
+                "is lighter than the paint's reflectance_white or darker than its reflectance_black");
   return std::clamp(coverage, 0., 1.);
 }
 
@@ -68,7 +71,8 @@ Reading read_step(JsonObject& json, const CellDescription& cell) {
   const auto painted = json.optional_number("painted", {0, 1});
   const auto reflectance = json.optional_number("reflectance", {0, 1});
   if (painted && reflectance) json.refuse("reflectance", "contradicts painted: give one of the two");
-  if (!painted && !reflectance) json.refuse("painted", "has no reading yet: measure the field and fill it in");
+  if (!painted && !reflectance)
+    json.refuse("painted", "has no reading yet: measure the field and fill it in");
   step.painted = painted ? *painted : coverage_of(json, *reflectance, cell.paint);
   return reading;
 }
@@ -87,21 +91,24 @@ void refuse_missing_fields(const JsonObject& json, const std::vector<Reading>& r
   for (std::uint64_t row = 1; row <= WedgeCard::kRows; ++row)
     for (std::uint64_t column = 1; column <= WedgeCard::kColumns; ++column)
       if (const int count = times[{row, column}]; count != 1)
-        json.refuse("steps", "the field in row " + std::to_string(row) + ", column " + std::to_string(column) +
+        json.refuse("steps", "the field in row " + std::to_string(row) + ", column " +
+                                 std::to_string(column) +
                                  (count == 0 ? " is missing" : " stands there twice") +
                                  ": a curve needs each field of the card once");
 }
 
-/// More paint was asked of each field than of the one before, among those of the same energy: a reading that falls is
-/// wrong, or the one before it is. What is read of a saturated paint scatters by less than kNoise.
-void refuse_falling_readings(const JsonObject& json, std::vector<Reading> readings, std::span<const double> levels) {
+/// More paint was asked of each field than of the one before, among those of the same energy: a reading that
+/// falls is wrong, or the one before it is. What is read of a saturated paint scatters by less than kNoise.
+void refuse_falling_readings(const JsonObject& json, std::vector<Reading> readings,
+                             std::span<const double> levels) {
   constexpr double kNoise = .02;
   std::stable_sort(readings.begin(), readings.end(),
                    [](const Reading& a, const Reading& b) { return a.step.asked < b.step.asked; });
   for (std::size_t i = 1; i < readings.size(); ++i) {
     const WedgeStep& before = readings[i - 1].step;
     const WedgeStep& step = readings[i].step;
-    if (level_for(levels, before.asked) != level_for(levels, step.asked)) continue;  // fewer, stronger dots cover less
+    if (level_for(levels, before.asked) != level_for(levels, step.asked))
+      continue;  // fewer, stronger dots cover less
     if (step.painted < before.painted - kNoise)
       json.refuse("steps", field_name(readings[i]) + " reads " + number(step.painted, 3) + ", but " +
                                field_name(readings[i - 1]) + ", which was asked for less, reads " +
@@ -131,7 +138,8 @@ void refuse_other_placement(JsonObject& json, const JobSettings& settings) {
   refuse_other("levels", std::to_string(json.integer("levels", 1, 4)), std::to_string(settings.levels));
   const double dpi = json.number("dpi", {10, 1200});
   if (!settings.dpi || std::abs(dpi - *settings.dpi) > 1e-6 * dpi)
-    json.refuse("dpi", "the settings have another: give the settings it was painted with (--settings wedge.json)");
+    json.refuse("dpi",
+                "the settings have another: give the settings it was painted with (--settings wedge.json)");
 }
 
 }  // namespace
@@ -155,20 +163,23 @@ std::string wedge_model(const WedgeCard& card, const CellDescription::Paint& pai
     for (int column = 0; column < columns; ++column) {
       const int corner = row * (columns + 1) + column;
       // Counter-clockwise as seen from +y.
-      faces << corner << ' ' << corner + columns + 1 << ' ' << corner + columns + 2 << ' ' << corner + 1 << " -1, ";
+      faces << corner << ' ' << corner + columns + 1 << ' ' << corner + columns + 2 << ' ' << corner + 1
+            << " -1, ";
       double wanted = 0;
       if (row % 2 == 1 && column % 2 == 1)
-        wanted = card.asked[static_cast<std::size_t>(row / 2 * WedgeCard::kColumns + column / 2)] / card.asked.back();
+        wanted = card.asked[static_cast<std::size_t>(row / 2 * WedgeCard::kColumns + column / 2)] /
+                 card.asked.back();
       else if (row == 0 && column == 0)
         wanted = 1;
-      const double srgb =
-          srgb_of_linear(paint.reflectance_white - wanted * (paint.reflectance_white - paint.reflectance_black));
+      const double srgb = srgb_of_linear(paint.reflectance_white -
+                                         wanted * (paint.reflectance_white - paint.reflectance_black));
       colors << srgb << ' ' << srgb << ' ' << srgb << ", ";
     }
   return "#VRML V2.0 utf8\n# A gray wedge: " + std::to_string(WedgeCard::kRows) + " rows of " +
          std::to_string(WedgeCard::kColumns) + " fields, the lightest beside the black corner.\n" +
-         "Shape { geometry IndexedFaceSet {\n  colorPerVertex FALSE\n  coord Coordinate { point [ " + points.str() +
-         "] }\n  coordIndex [ " + faces.str() + "]\n  color Color { color [ " + colors.str() + "] }\n} }\n";
+         "Shape { geometry IndexedFaceSet {\n  colorPerVertex FALSE\n  coord Coordinate { point [ " +
+         points.str() + "] }\n  coordIndex [ " + faces.str() + "]\n  color Color { color [ " + colors.str() +
+         "] }\n} }\n";
 }
 
 JobSettings wedge_settings(const JobSettings& settings) {
@@ -188,10 +199,13 @@ JobSettings wedge_settings(const JobSettings& settings) {
 
 /// In the form itself, because that is what the person with the densitometer has at hand.
 constexpr const char* kHowToMeasure =
-    "Measure the middle of each field: row 1, column 1 is beside the black corner. painted is the part of the field "
+    "Measure the middle of each field: row 1, column 1 is beside the black corner. painted is the part of "
+    "the field "
     "that "
-    "the paint covers, 0 (as the bare white) to 1 (as the black corner): (white - field) / (white - black), each a "
-    "reflectance in linear light. Or give reflectance (0 to 1) instead of painted; the cell file's paint then says "
+    "the paint covers, 0 (as the bare white) to 1 (as the black corner): (white - field) / (white - black), "
+    "each a "
+    "reflectance in linear light. Or give reflectance (0 to 1) instead of painted; the cell file's paint "
+    "then says "
     "what "
     "white and black are. asked is what was asked for: leave it.";
 constexpr std::size_t kMaxHowToMeasure = 1000;  // bytes

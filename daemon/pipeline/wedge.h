@@ -10,12 +10,12 @@
 
 /// A gray wedge for the real cell to paint, and the readings of its fields.
 ///
-/// The card is flat: fields in rows and columns on white, with a black corner beside the first field. The asked
-/// coverage of the fields increases along the rows, up to the cell's asked_max. Steps:
-///   hilbrush calibrate --wedge -o W --sampler S --dpi D    writes W/wedge.wrl, W/wedge.json, W/wedge_steps.json
-///   hilbrush submit W/wedge.wrl --settings W/wedge.json    paints it, on a flat, coated card
-///   an operator measures each field and fills in wedge_steps.json
-///   hilbrush calibrate --measured W/wedge_steps.json --settings W/wedge.json -o C    writes C/tone_curve.json
+/// The card is flat: fields in rows and columns on white, with a black corner beside the first field. The
+/// asked coverage of the fields increases along the rows, up to the cell's asked_max. Steps:
+///   hilbrush calibrate --wedge -o W --sampler S --dpi D    writes W/wedge.wrl, W/wedge.json,
+///   W/wedge_steps.json hilbrush submit W/wedge.wrl --settings W/wedge.json    paints it, on a flat, coated
+///   card an operator measures each field and fills in wedge_steps.json hilbrush calibrate --measured
+///   W/wedge_steps.json --settings W/wedge.json -o C    writes C/tone_curve.json
 namespace hilbrush {
 
 struct WedgeCard {
@@ -42,11 +42,11 @@ JobSettings wedge_settings(const JobSettings& settings);
 /// The form to fill in: how to measure, and for each field its asked coverage, and `painted` still null.
 std::string wedge_form(const WedgeCard& card, const JobSettings& settings);
 
-/// Reads a form that was filled in: each step has `asked` and either `painted` (coverage, 0 to 1) or `reflectance`
-/// (linear light; the cell's paint gives the reflectance of white and black).
-/// @throws InputError with the JSON path for unknown keys, for steps without a reading, for a field that is missing,
-/// for readings that fall where more was asked for, or that are all the same, and for a wedge that was painted with
-/// other settings of placement than `settings`.
+/// Reads a form that was filled in: each step has `asked` and either `painted` (coverage, 0 to 1) or
+/// `reflectance` (linear light; the cell's paint gives the reflectance of white and black).
+/// @throws InputError with the JSON path for unknown keys, for steps without a reading, for a field that is
+/// missing, for readings that fall where more was asked for, or that are all the same, and for a wedge that
+/// was painted with other settings of placement than `settings`.
 std::vector<WedgeStep> read_wedge_form(const std::filesystem::path& file, const JobSettings& settings,
                                        const CellDescription& cell);
 

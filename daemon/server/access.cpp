@@ -40,7 +40,8 @@ std::vector<gid_t> groups_of(const passwd& user) {
 /// Without a branch on the digits.
 bool is_same_digest(const std::string& a, const std::string& b) {
   unsigned difference = a.size() == b.size() ? 0 : 1;
-  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) difference |= static_cast<unsigned>(a[i] ^ b[i]);
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    difference |= static_cast<unsigned>(a[i] ^ b[i]);
   return difference == 0;
 }
 
@@ -81,9 +82,9 @@ Peer Access::local_peer(uid_t uid, gid_t gid, pid_t pid, const std::vector<gid_t
   peer.may_operate = !has_rules_ || uid == 0 || uid == ::geteuid();
   peer.may_look = peer.may_operate;
   for (const Rule& rule : rules_) {
-    const bool is_meant = rule.uid
-                              ? *rule.uid == uid
-                              : *rule.gid == gid || std::find(groups.begin(), groups.end(), *rule.gid) != groups.end();
+    const bool is_meant =
+        rule.uid ? *rule.uid == uid
+                 : *rule.gid == gid || std::find(groups.begin(), groups.end(), *rule.gid) != groups.end();
     if (!is_meant) continue;
     peer.may_look = true;
     peer.may_operate |= rule.may_operate;
@@ -101,8 +102,9 @@ std::optional<Peer> Access::token_peer(const std::string& token, const std::stri
 }
 
 bool TokenFailures::may_try(const std::string& address) {
-  std::erase_if(failures_,
-                [now = Clock::now()](const auto& entry) { return now - entry.second.first > std::chrono::minutes(1); });
+  std::erase_if(failures_, [now = Clock::now()](const auto& entry) {
+    return now - entry.second.first > std::chrono::minutes(1);
+  });
   const auto found = failures_.find(host_of(address));
   return found == failures_.end() || found->second.count < kFailuresMax;
 }

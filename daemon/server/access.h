@@ -21,7 +21,8 @@ class Access {
 
   /// A process on this machine; `groups` are all that it is in.
   Peer local_peer(uid_t uid, gid_t gid, pid_t pid, const std::vector<gid_t>& groups) const;
-  /// The owner of a token that came over TCP; empty if there is none. Takes the same time whatever the token is.
+  /// The owner of a token that came over TCP; empty if there is none. Takes the same time whatever the token
+  /// is.
   std::optional<Peer> token_peer(const std::string& token, const std::string& address) const;
 
  private:
@@ -39,8 +40,8 @@ class Access {
   std::vector<Token> tokens_;
 };
 
-/// Wrong tokens by the address they came from: after too many within a minute, no token from there is tried. Socket
-/// thread only.
+/// Wrong tokens by the address they came from: after too many within a minute, no token from there is tried.
+/// Socket thread only.
 class TokenFailures {
  public:
   static constexpr int kFailuresMax = 20;             ///< of an address within a minute

@@ -63,9 +63,9 @@ void AuditLog::record_refusal(const Peer& peer, const std::string& method) noexc
   }
   last_refusal_ = now;
   const auto unrecorded = std::exchange(refusals_, 0);
-  record(
-      peer, method, Json::object(),
-      unrecorded == 0 ? "refused" : "refused, as " + std::to_string(unrecorded) + " others since the last such line");
+  record(peer, method, Json::object(),
+         unrecorded == 0 ? "refused"
+                         : "refused, as " + std::to_string(unrecorded) + " others since the last such line");
 }
 
 }  // namespace hilbrush

@@ -8,9 +8,9 @@
 #include "daemon/server/json_rpc.h"
 #include "daemon/server/peer.h"
 
-/// Who did what: one line an act (requests that only look are not recorded) with time, user, uid, pid, address, method,
-/// a summary of the parameters, and the result. Appended to, never rewritten; rotation is the system's. Socket thread
-/// only.
+/// Who did what: one line an act (requests that only look are not recorded) with time, user, uid, pid,
+/// address, method, a summary of the parameters, and the result. Appended to, never rewritten; rotation is
+/// the system's. Socket thread only.
 namespace hilbrush {
 
 class AuditLog {
@@ -21,10 +21,12 @@ class AuditLog {
   AuditLog(const AuditLog&) = delete;
   AuditLog& operator=(const AuditLog&) = delete;
 
-  /// `result`: "ok" or the fault's sentence. A line that cannot be written is lost: a full disk must not keep the
-  /// cell from being stopped.
-  void record(const Peer& peer, const std::string& method, const Json& params, const std::string& result) noexcept;
-  /// A wrong token. At most one line in kRefusalPeriod: the others are counted, and the next line says how many.
+  /// `result`: "ok" or the fault's sentence. A line that cannot be written is lost: a full disk must not keep
+  /// the cell from being stopped.
+  void record(const Peer& peer, const std::string& method, const Json& params,
+              const std::string& result) noexcept;
+  /// A wrong token. At most one line in kRefusalPeriod: the others are counted, and the next line says how
+  /// many.
   void record_refusal(const Peer& peer, const std::string& method) noexcept;
 
  private:

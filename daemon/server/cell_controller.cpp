@@ -12,8 +12,9 @@ Json axes_json(const char* state, const std::string& fault) {
 /// Millimeters and degrees: for people.
 Json joints_json(const Robot::Positions& robot, const Table::Positions& table) {
   constexpr double kDegrees = 180 / std::numbers::pi;
-  return {{"j1_deg", robot[kJ1] * kDegrees}, {"j2_deg", robot[kJ2] * kDegrees}, {"j3_mm", robot[kJ3] * 1e3},
-          {"j4_deg", robot[kJ4] * kDegrees}, {"a_deg", table[0] * kDegrees},    {"c_deg", table[1] * kDegrees}};
+  return {{"j1_deg", robot[kJ1] * kDegrees}, {"j2_deg", robot[kJ2] * kDegrees},
+          {"j3_mm", robot[kJ3] * 1e3},       {"j4_deg", robot[kJ4] * kDegrees},
+          {"a_deg", table[0] * kDegrees},    {"c_deg", table[1] * kDegrees}};
 }
 
 }  // namespace
@@ -68,7 +69,8 @@ void CellController::check_devices() {
   if (state_ != State::kIdle && state_ != State::kArmed) return;
   const Cell cell = devices_.cell();
   const auto check_axes = [this](const char* name, const auto& axes) {
-    if (axes.state == DeviceState::kFault) stop(std::string("the ") + name + " reports a fault: " + axes.fault);
+    if (axes.state == DeviceState::kFault)
+      stop(std::string("the ") + name + " reports a fault: " + axes.fault);
     if (axes.state == DeviceState::kDisconnected) stop(std::string("the ") + name + " is disconnected");
     return state_ != State::kStopped;
   };
@@ -99,7 +101,8 @@ void CellController::note_executor_at_rest() {
 }
 
 CellThread::OnActEnd CellController::end_of_act(Reply reply, State reached, const char* overtaken) {
-  return [this, reply = std::move(reply), reached, overtaken, stops = stops_](const std::optional<CellFault>& fault) {
+  return [this, reply = std::move(reply), reached, overtaken,
+          stops = stops_](const std::optional<CellFault>& fault) {
     if (stops != stops_) return reply.fault({kRpcWrongState, overtaken, ""});
     finish_act(reply, reached, fault);
   };
@@ -108,7 +111,8 @@ CellThread::OnActEnd CellController::end_of_act(Reply reply, State reached, cons
 void CellController::begin_clear(Reply reply) {
   thread_.release_stop();
   state_ = State::kClearing;
-  thread_.clear(end_of_act(std::move(reply), State::kIdle, "the cell was stopped again while it was cleared"));
+  thread_.clear(
+      end_of_act(std::move(reply), State::kIdle, "the cell was stopped again while it was cleared"));
 }
 
 void CellController::arm(Reply reply) {

@@ -39,14 +39,15 @@ std::string program_sha256(const std::filesystem::path& file) {
   return hash.hex_digest();
 }
 
-/// What the job needs to go on after a power cut - program, model, its row in the store - is durable before its first
-/// dot.
+/// What the job needs to go on after a power cut - program, model, its row in the store - is durable before
+/// its first dot.
 void sync_file_system(const std::filesystem::path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const bool is_synced = fd >= 0 && ::syncfs(fd) == 0;
   const int error = errno;
   if (fd >= 0) ::close(fd);
-  if (!is_synced) throw std::runtime_error(folder.string() + ": cannot be synced to disk: " + std::strerror(error));
+  if (!is_synced)
+    throw std::runtime_error(folder.string() + ": cannot be synced to disk: " + std::strerror(error));
 }
 
 void check_provenance(const Provenance& found, const PaintOrder& order, const CellDescription& description) {
@@ -102,8 +103,8 @@ void CellThread::stop(std::function<void(bool)> on_end) {
   woken_.notify_all();
 }
 
-/// Stops that were ordered meanwhile are carried out together. A command that the executor was about to send when the
-/// stop came (a reference run may take a minute) is stopped again, until the executor is at rest.
+/// Stops that were ordered meanwhile are carried out together. A command that the executor was about to send
+/// when the stop came (a reference run may take a minute) is stopped again, until the executor is at rest.
 void CellThread::carry_out_stops() {
   for (;;) {
     std::vector<std::function<void(bool)>> ordered;
@@ -132,7 +133,8 @@ void CellThread::carry_out_stops() {
 void CellThread::push(std::function<void()> task) {
   {
     const std::lock_guard lock(mutex_);
-    CHECK_LT(tasks_.size(), kQueueMax);  // acts wait for each other's answers, so only a few can ever be under way
+    CHECK_LT(tasks_.size(),
+             kQueueMax);  // acts wait for each other's answers, so only a few can ever be under way
     tasks_.push_back(std::move(task));
   }
   woken_.notify_all();
@@ -224,8 +226,8 @@ void CellThread::find_references() {
   check_stop();
 }
 
-/// A stop may come at any instant of this: its flag is checked after emission has been armed, so that one of the two
-/// always undoes it.
+/// A stop may come at any instant of this: its flag is checked after emission has been armed, so that one of
+/// the two always undoes it.
 void CellThread::arm_devices() {
   find_references();
   if (cell_.laser.status().state == DeviceState::kConnected) cell_.laser.enable();
@@ -287,16 +289,18 @@ CellThread::Loaded CellThread::load(const PaintOrder& order) const {
         ": the journal is missing, so it is unknown what was exposed: this part cannot be finished; "
         "cancel the job and submit it again for a new part");
   if (is_new) sync_file_system(order.folder);
-  Journal journal =
-      is_new ? Journal::create(journal_file, program.exposures.size(), sha256) : Journal::open(journal_file, sha256);
-  if (journal.exposure_count() != program.exposures.size()) throw JobFilesFault("the journal does not fit the program");
+  Journal journal = is_new ? Journal::create(journal_file, program.exposures.size(), sha256)
+                           : Journal::open(journal_file, sha256);
+  if (journal.exposure_count() != program.exposures.size())
+    throw JobFilesFault("the journal does not fit the program");
   return {std::move(program), std::move(journal), {}};
 }
 
 PaintTally CellThread::tally(const Loaded& loaded) {
   PaintTally tally;
   tally.exposed = loaded.journal.done_count();
-  for (const std::size_t i : loaded.journal.in_doubt()) tally.in_doubt.push_back(loaded.program.exposures[i].dot_index);
+  for (const std::size_t i : loaded.journal.in_doubt())
+    tally.in_doubt.push_back(loaded.program.exposures[i].dot_index);
   return tally;
 }
 
@@ -359,7 +363,9 @@ void CellThread::paint(std::vector<Joints> approach, std::function<void(std::siz
         loaded_.reset();
         return painted;
       },
-      [on_end = std::move(on_end)](Painted painted) { on_end(std::move(painted.first), std::move(painted.second)); });
+      [on_end = std::move(on_end)](Painted painted) {
+        on_end(std::move(painted.first), std::move(painted.second));
+      });
 }
 
 void CellThread::release() {

@@ -15,9 +15,9 @@
 #include "daemon/execution/executor.h"
 #include "daemon/execution/journal.h"
 
-/// The executor's thread: the only one that commands motion. Orders come from the socket thread through a queue of at
-/// most kQueueMax; answers go back as closures posted to the socket thread. Stops overtake everything: they have a
-/// thread of their own.
+/// The executor's thread: the only one that commands motion. Orders come from the socket thread through a
+/// queue of at most kQueueMax; answers go back as closures posted to the socket thread. Stops overtake
+/// everything: they have a thread of their own.
 namespace hilbrush {
 
 /// Hands a closure to the socket thread. Any thread.
@@ -27,7 +27,7 @@ using PostToSocketThread = std::function<void(std::function<void()>)>;
 struct PaintOrder {
   std::filesystem::path folder;  ///< program.ply, and for each copy a journal and emissions
   std::string model_sha256, settings_sha256;
-  int copy = 1;                     ///< journal, emissions.ply; from the second on journal-2, emissions-2.ply, ...
+  int copy = 1;  ///< journal, emissions.ply; from the second on journal-2, emissions-2.ply, ...
   bool may_create_journal = false;  ///< nothing of this copy has ever been painted
   bool exposes_in_doubt = false;    ///< the operator orders the dots in doubt again
 };
@@ -45,7 +45,8 @@ struct PaintTally {
 struct CellFault {
   std::string sentence;
   bool is_program_at_fault = false;  ///< the job's files are at fault, not the cell
-  bool is_for_another_cell = false;  ///< nothing is at fault: the daemon runs another cell than the job was made for
+  bool is_for_another_cell =
+      false;  ///< nothing is at fault: the daemon runs another cell than the job was made for
 };
 
 struct Prepared {
@@ -67,11 +68,11 @@ class CellThread {
   CellThread(const CellThread&) = delete;
   CellThread& operator=(const CellThread&) = delete;
 
-  /// Laser off, emission disabled, axes stopped; latched until release_stop(). Any thread. @return true if the laser
-  /// confirms.
+  /// Laser off, emission disabled, axes stopped; latched until release_stop(). Any thread. @return true if
+  /// the laser confirms.
   bool stop_now() noexcept;
-  /// The same from a thread of its own, so that a device which does not answer delays no other request: no pulse is
-  /// begun any more when this returns, and `on_end` gets whether the laser confirms.
+  /// The same from a thread of its own, so that a device which does not answer delays no other request: no
+  /// pulse is begun any more when this returns, and `on_end` gets whether the laser confirms.
   void stop(std::function<void(bool is_laser_off)> on_end);
   bool is_stop_latched() const { return control_.stop.load(); }
   /// The run ends between two dots. Socket thread, as everything below; callbacks are posted there.
@@ -91,8 +92,8 @@ class CellThread {
   void home(OnActEnd on_end);
   /// The laser's emission disarmed: at the end of a job.
   void disarm();
-  /// Reads the program and the journal (made at a job's first start), checks where they come from, reads the true
-  /// joints.
+  /// Reads the program and the journal (made at a job's first start), checks where they come from, reads the
+  /// true joints.
   void prepare(PaintOrder order, std::function<void(Prepared)> on_end);
   /// Paints what prepare() has read. Progress comes at most ten times a second.
   void paint(std::vector<Joints> approach, std::function<void(std::size_t exposed)> on_progress,

@@ -42,7 +42,8 @@ CellDescription described_cell(const fs::path& file, const std::optional<double>
   if (!is_simulated && description.simulation.time_scale <= 0) description.simulation.time_scale = 1;
   if (!time_scale) return description;
   if (!(*time_scale >= 0 && *time_scale <= 1000)) throw InputError("--time-scale", "must be 0 to 1000");
-  if (!is_simulated) throw InputError("--time-scale", "is for simulated cells only: real time cannot be scaled");
+  if (!is_simulated)
+    throw InputError("--time-scale", "is for simulated cells only: real time cannot be scaled");
   description.simulation.time_scale = *time_scale;
   return description;
 }
@@ -85,10 +86,11 @@ struct Daemon::Implementation {
         access(given.settings),
         store(state / "jobs.sqlite"),
         audit(state / "audit.log"),
-        devices(given.make_devices ? given.make_devices(description) : make_cell_devices(description, cell_file)),
+        devices(given.make_devices ? given.make_devices(description)
+                                   : make_cell_devices(description, cell_file)),
         thread(*devices, description, post),
-        children(given.pipeline,
-                 ChildLimits{.silence_s = given.pipeline_silence_s, .resident_bytes = given.pipeline_memory_mb << 20}),
+        children(given.pipeline, ChildLimits{.silence_s = given.pipeline_silence_s,
+                                             .resident_bytes = given.pipeline_memory_mb << 20}),
         controller(thread, *devices, description),
         queue(made_folder(state / "jobs"), store),
         planning(queue, {children, checks, copies}, description, cell_file, post),
@@ -103,12 +105,14 @@ struct Daemon::Implementation {
     };
     queue.on_change = [this](const Job& job) { server.notify(job); };
     notice = store.notice();
-    if (const std::string found = queue.restore(); !found.empty()) notice += (notice.empty() ? "" : "; ") + found;
+    if (const std::string found = queue.restore(); !found.empty())
+      notice += (notice.empty() ? "" : "; ") + found;
     painting.restore();
     planning.plan_next();
     server.listen(options.socket, {methods, queue, access});
     if (const auto& tcp = options.settings.tcp)
-      tcp_address = tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, queue, access}));
+      tcp_address =
+          tcp->host + ":" + std::to_string(server.listen_tcp(tcp->host, tcp->port, {methods, queue, access}));
     constexpr double kDevicePollS = .05;
     server.every(kDevicePollS, [this] { controller.check_devices(); });
     constexpr double kStorePeriodS = 5;
@@ -142,7 +146,8 @@ struct Daemon::Implementation {
     constexpr double kPeriodS = 0.01;
     constexpr auto kEndPatience = std::chrono::seconds(10);
     server.poll(kPeriodS, [this, deadline = std::chrono::steady_clock::now() + kEndPatience] {
-      if ((thread.is_busy() || painting.is_painting()) && std::chrono::steady_clock::now() < deadline) return false;
+      if ((thread.is_busy() || painting.is_painting()) && std::chrono::steady_clock::now() < deadline)
+        return false;
       server.end_run();
       return true;
     });

@@ -50,7 +50,8 @@ class Daemon {
 
   /// SIGTERM and SIGINT end the daemon in order; `on_signal` is called first. Before run().
   void end_on_signals(std::function<void()> on_signal = {});
-  /// Calls `task` on the socket thread periodically: as long as it is called, requests are served. Before run().
+  /// Calls `task` on the socket thread periodically: as long as it is called, requests are served. Before
+  /// run().
   void every(double period_s, std::function<void()> task);
   /// host:port that is listened on, or empty.
   const std::string& tcp_address() const;
@@ -58,7 +59,8 @@ class Daemon {
   void run();
   /// Any thread.
   void end();
-  /// The beam off at once, for the last moments of a process that is about to abort. Any thread, never throws.
+  /// The beam off at once, for the last moments of a process that is about to abort. Any thread, never
+  /// throws.
   void laser_off() noexcept;
   /// For the operator at start-up, such as that a job store had to be set aside; or empty.
   const std::string& notice() const;

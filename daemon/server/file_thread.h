@@ -9,8 +9,8 @@
 #include <stop_token>
 #include <thread>
 
-/// Opens and copies the files that clients name, because a file system may take long to answer, or never answer: no
-/// other thread opens such a path.
+/// Opens and copies the files that clients name, because a file system may take long to answer, or never
+/// answer: no other thread opens such a path.
 namespace hilbrush {
 
 /// One thread, one task after another. Methods: any thread.

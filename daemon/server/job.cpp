@@ -104,7 +104,8 @@ std::optional<Job> job_from_record(const std::string& text) {
   };
   Job job;
   std::string state;
-  if (!take("id", job.id) || job.id <= 0 || !take("state", state) || !job_state_from_name(state)) return std::nullopt;
+  if (!take("id", job.id) || job.id <= 0 || !take("state", state) || !job_state_from_name(state))
+    return std::nullopt;
   job.state = *job_state_from_name(state);
   take("key", job.key);
   take("uid", job.uid);
@@ -152,7 +153,8 @@ Json timing_json(const Job& job) {
   Json measured = Json::parse(job.measured, nullptr, false);
   if (!measured.is_object()) measured = nullptr;
   for (const char* key : {"moves", "is_enough"}) {  // beside what may be copied into a cell file
-    timing[std::string("measured_") + key] = measured.is_object() && measured.contains(key) ? measured[key] : nullptr;
+    timing[std::string("measured_") + key] =
+        measured.is_object() && measured.contains(key) ? measured[key] : nullptr;
     if (measured.is_object()) measured.erase(key);
   }
   timing["measured"] = std::move(measured);
@@ -176,8 +178,9 @@ Json plan_of_report(const Json& report) {
   const Json mesh = member(report, "mesh");
   for (const char* key : {"size_mm", "min_mm", "max_mm"}) {
     const Json value = member(mesh, key);
-    const bool is_vector = value.is_array() && value.size() == 3 &&
-                           std::all_of(value.begin(), value.end(), [](const Json& each) { return each.is_number(); });
+    const bool is_vector =
+        value.is_array() && value.size() == 3 &&
+        std::all_of(value.begin(), value.end(), [](const Json& each) { return each.is_number(); });
     plan[key] = is_vector ? value : Json(nullptr);
   }
   Json causes = Json::array();
@@ -207,8 +210,8 @@ Json job_to_json(const Job& job) {
   json["eta_s"] = job.eta_s ? Json(*job.eta_s) : Json(nullptr);
   json["output"] = job.folder.string();
   json["error"] = job.error ? Json{{"at", job.error->at}, {"message", job.error->message}} : Json(nullptr);
-  json["in_doubt"] =
-      std::vector<std::uint32_t>(job.in_doubt.begin(), job.in_doubt.begin() + static_cast<std::ptrdiff_t>(listed));
+  json["in_doubt"] = std::vector<std::uint32_t>(job.in_doubt.begin(),
+                                                job.in_doubt.begin() + static_cast<std::ptrdiff_t>(listed));
   json["warnings"] = job.warnings;
   const Json plan = Json::parse(job.plan, nullptr, false);
   json["plan"] = plan.is_object() ? plan : Json(nullptr);
@@ -231,8 +234,9 @@ Json job_to_json(const Job& job) {
 std::size_t job_json_bytes(const Job& job) {
   constexpr std::size_t kKeyBytes = 900;   // of all keys, with their punctuation
   constexpr std::size_t kIndexBytes = 11;  // of a dot in doubt, at most
-  std::size_t bytes = kKeyBytes + job.settings.size() + job.plan.size() + job.measured.size() + job.key.size() +
-                      job.model.native().size() + job.model_copy.native().size() + job.folder.native().size() +
+  std::size_t bytes = kKeyBytes + job.settings.size() + job.plan.size() + job.measured.size() +
+                      job.key.size() + job.model.native().size() + job.model_copy.native().size() +
+                      job.folder.native().size() +
                       kIndexBytes * std::min(job.in_doubt.size(), kListedInDoubtMax);
   for (const std::string& warning : job.warnings) bytes += warning.size();
   return job.error ? bytes + job.error->at.size() + job.error->message.size() : bytes;

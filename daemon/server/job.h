@@ -14,8 +14,8 @@ namespace hilbrush {
 
 using Json = nlohmann::ordered_json;
 
-/// queued -> planning -> ready -> painting <-> paused -> done | failed | cancelled. Dry jobs go from planning to done;
-/// a job of several copies goes from painting to ready after each but the last.
+/// queued -> planning -> ready -> painting <-> paused -> done | failed | cancelled. Dry jobs go from planning
+/// to done; a job of several copies goes from painting to ready after each but the last.
 enum class JobState { kQueued, kPlanning, kReady, kPainting, kPaused, kDone, kFailed, kCancelled };
 const char* job_state_name(JobState state);
 std::optional<JobState> job_state_from_name(const std::string& name);
@@ -46,9 +46,10 @@ struct Job {
   std::int64_t rank = 0;  ///< jobs that wait are planned, listed and painted in ascending order
   int copies = 1;         ///< parts to paint, one after another
   int copies_done = 0;
-  bool is_begun = false;                ///< the journal of the present copy exists: it must never be created again
+  bool is_begun = false;  ///< the journal of the present copy exists: it must never be created again
   std::string created, started, ended;  ///< ISO 8601, UTC; started: first painted; empty: not yet
-  std::filesystem::path folder;  ///< job.json, model/, program.ply, dots.ply, report.json, journal, emissions.ply
+  std::filesystem::path
+      folder;  ///< job.json, model/, program.ply, dots.ply, report.json, journal, emissions.ply
 
   /// Counts of dots of the present copy; placed = exposed + in doubt + remaining + skipped.
   std::uint64_t placed = 0;
@@ -61,7 +62,8 @@ struct Job {
   double planned_s = 0;  ///< the time model's total for the whole program
   std::optional<JobError> error;
   std::vector<std::string> warnings;  ///< of the pipeline, the first kWarningsMax
-  /// What an operator should see before painting, of the report: a JSON object as text, or empty. See plan_of_report().
+  /// What an operator should see before painting, of the report: a JSON object as text, or empty. See
+  /// plan_of_report().
   std::string plan;
   std::string model_sha256;  ///< over the copied files, as programs name it
   std::string settings_sha256;
@@ -73,13 +75,13 @@ struct Job {
     double p99_s = 0;
   } own_time;
   DurationHistogram own_times;
-  /// What moves were measured to take, as a cell file's `measured`, with `moves` and `is_enough`: a JSON object as
-  /// text, or empty.
+  /// What moves were measured to take, as a cell file's `measured`, with `moves` and `is_enough`: a JSON
+  /// object as text, or empty.
   std::string measured;
   MotionTimes motion_times;
 
-  /// Not stored: an operator has confirmed that the part is in its place, and nothing has happened since that could
-  /// have moved it.
+  /// Not stored: an operator has confirmed that the part is in its place, and nothing has happened since that
+  /// could have moved it.
   bool is_part_confirmed = false;
   int position = 0;       ///< in the queue, from 1; 0: not in it. Not kept.
   std::uint64_t seq = 0;  ///< rises with every change that is reported; starts at 0 with the daemon
@@ -93,13 +95,13 @@ struct Job {
   }
 };
 
-/// Everything that is kept of a job, as text, and back. Reading is tolerant: missing values and those of a wrong type
-/// keep their defaults; empty if the text is not a job at all.
+/// Everything that is kept of a job, as text, and back. Reading is tolerant: missing values and those of a
+/// wrong type keep their defaults; empty if the text is not a job at all.
 std::string job_to_record(const Job& job);
 std::optional<Job> job_from_record(const std::string& text);
 
-/// The object's size and place, the causes of skipped dots, and the suggestion, of a report of the pipeline: bounded,
-/// whatever the report holds.
+/// The object's size and place, the causes of skipped dots, and the suggestion, of a report of the pipeline:
+/// bounded, whatever the report holds.
 Json plan_of_report(const Json& report);
 
 /// The job object of the protocol. At most 1000 in-doubt dots are listed; dots.in_doubt counts them all.

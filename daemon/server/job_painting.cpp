@@ -21,7 +21,8 @@ PaintOrder paint_order(const Job& job) {
 }
 
 double fraction_exposed(const Job& job) {
-  return static_cast<double>(job.exposed) / static_cast<double>(std::max<std::uint64_t>(job.exposure_count(), 1));
+  return static_cast<double>(job.exposed) /
+         static_cast<double>(std::max<std::uint64_t>(job.exposure_count(), 1));
 }
 
 void take_tally(Job& job, const PaintTally& tally) {
@@ -82,8 +83,9 @@ std::optional<JobError> error_after(const ExecutionResult& result, const std::st
 
 }  // namespace
 
-JobPainting::JobPainting(JobQueue& queue, CellController& controller, CellThread& thread, PipelineChildren& children,
-                         const CellDescription& description, PostToSocketThread post)
+JobPainting::JobPainting(JobQueue& queue, CellController& controller, CellThread& thread,
+                         PipelineChildren& children, const CellDescription& description,
+                         PostToSocketThread post)
     : queue_(queue),
       controller_(controller),
       thread_(thread),
@@ -122,11 +124,12 @@ Job& JobPainting::resume(const std::string& id, bool exposes_in_doubt, bool is_p
   if (job.state == JobState::kReady) forbid(job, "it begins with job.start");
   if (job.state != JobState::kPaused) forbid(job, "only a paused job can be resumed");
   if (!job.is_part_confirmed && !is_part_in_place)
-    throw RpcFault{kRpcWrongState,
-                   "job " + std::to_string(job.id) +
-                       " is paused, and since its last run the cell was stopped or the daemon was restarted: confirm "
-                       "that its part is in its place as before (part_in_place)",
-                   "$.part_in_place"};
+    throw RpcFault{
+        kRpcWrongState,
+        "job " + std::to_string(job.id) +
+            " is paused, and since its last run the cell was stopped or the daemon was restarted: confirm "
+            "that its part is in its place as before (part_in_place)",
+        "$.part_in_place"};
   begin_run(job, exposes_in_doubt);
   return job;
 }
@@ -175,8 +178,8 @@ void JobPainting::approach(const Prepared& prepared) {
   Job& job = *queue_.find(run_->job);
   if (prepared.fault && prepared.fault->is_for_another_cell) return keep_for_its_cell(job, *prepared.fault);
   if (prepared.fault)
-    return end_run_before_painting(thread_.is_stop_latched() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed,
-                                   *prepared.fault);
+    return end_run_before_painting(
+        thread_.is_stop_latched() ? ExecutionOutcome::kStopped : ExecutionOutcome::kFailed, *prepared.fault);
   job.is_begun = true;  // stored before the first dot
   take_tally(job, prepared.tally);
   queue_.changed(job);
@@ -191,7 +194,8 @@ void JobPainting::approach(const Prepared& prepared) {
     paint({});
 }
 
-/// The path from where the axes really are to the next dot: planned by a child, because the daemon has no mesh.
+/// The path from where the axes really are to the next dot: planned by a child, because the daemon has no
+/// mesh.
 void JobPainting::plan_approach(Job& job, std::size_t next, const Joints& from) {
   run_->phase = Run::Phase::kApproaching;
   job.stage = "approach";
@@ -340,8 +344,8 @@ void JobPainting::handle_stop() {
   leave_approach(ExecutionOutcome::kStopped, "the cell was stopped");
 }
 
-/// While the executor runs, its result ends the run. While the approach is planned, the executor has nothing to end, so
-/// the run ends here. @return false in all other phases.
+/// While the executor runs, its result ends the run. While the approach is planned, the executor has nothing
+/// to end, so the run ends here. @return false in all other phases.
 bool JobPainting::leave_approach(ExecutionOutcome outcome, const std::string& reason) {
   if (!run_ || run_->phase != Run::Phase::kApproaching) return false;
   if (run_->child) children_.cancel(*run_->child);

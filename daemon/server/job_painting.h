@@ -10,9 +10,9 @@
 #include "daemon/server/job_queue.h"
 #include "daemon/server/pipeline_child.h"
 
-/// From a planned job to a painted one, one job at a time. A run prepares (the executor's thread reads program and
-/// journal), approaches (a child plans the path from where the axes are) and paints. Socket thread only; what the
-/// executor and the child report is posted there.
+/// From a planned job to a painted one, one job at a time. A run prepares (the executor's thread reads
+/// program and journal), approaches (a child plans the path from where the axes are) and paints. Socket
+/// thread only; what the executor and the child report is posted there.
 namespace hilbrush {
 
 class JobPainting {
@@ -21,8 +21,8 @@ class JobPainting {
   JobPainting(JobQueue& queue, CellController& controller, CellThread& thread, PipelineChildren& children,
               const CellDescription& description, PostToSocketThread post);
 
-  /// After JobQueue::restore(): jobs with a journal on the disk have been begun, and their counts of dots are read from
-  /// it. Call once.
+  /// After JobQueue::restore(): jobs with a journal on the disk have been begun, and their counts of dots are
+  /// read from it. Call once.
   void restore();
   /// The daemon ends: no further journal is read. The cell has been stopped before, which ends a run.
   void shut_down() { is_ending_ = true; }
@@ -31,7 +31,8 @@ class JobPainting {
   /// The operator confirms that the part is in its place.
   Job& start(const std::string& id);
   Job& pause(const std::string& id);
-  /// The part must be confirmed again if the cell was stopped, or the daemon was restarted, since the last run.
+  /// The part must be confirmed again if the cell was stopped, or the daemon was restarted, since the last
+  /// run.
   Job& resume(const std::string& id, bool exposes_in_doubt, bool is_part_in_place);
 
   /// The job that is being painted ends as cancelled, at once or after the present dot.

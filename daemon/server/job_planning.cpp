@@ -17,7 +17,9 @@ namespace fs = std::filesystem;
 std::string cell_of(const SubmitOrder& order, const JobSettings& settings, const fs::path& cell_file,
                     const CellDescription& description) {
   if (!order.settings.contains("cell") || settings.cell == description.name) return cell_file.string();
-  const auto refuse = [](const std::string& sentence) { throw RpcFault{kRpcBadInput, sentence, "$.settings.cell"}; };
+  const auto refuse = [](const std::string& sentence) {
+    throw RpcFault{kRpcBadInput, sentence, "$.settings.cell"};
+  };
   if (settings.cell.find('/') != std::string::npos || settings.cell.ends_with(".json"))
     refuse("a job names a cell, it does not bring one");
   if (!order.dry_run)
@@ -76,22 +78,25 @@ Job JobPlanning::requested_job(const SubmitOrder& order, const Peer& peer) const
   return job;
 }
 
-/// The job that was submitted with the same key. @throws RpcFault if that was another order, or if no further job may
-/// wait.
+/// The job that was submitted with the same key. @throws RpcFault if that was another order, or if no further
+/// job may wait.
 Job* JobPlanning::earlier_job(const Job& job) {
   if (Job* earlier = queue_.find_key(job.key)) {
     if (is_same_order(*earlier, job)) return earlier;
-    throw RpcFault{kRpcBadParams,
-                   "belongs to job " + std::to_string(earlier->id) + ", which was submitted with other parameters",
-                   "$.key"};
+    throw RpcFault{
+        kRpcBadParams,
+        "belongs to job " + std::to_string(earlier->id) + ", which was submitted with other parameters",
+        "$.key"};
   }
   const auto unplanned = std::count_if(queue_.jobs().begin(), queue_.jobs().end(),
                                        [](const auto& entry) { return is_unplanned(entry.second); });
   if (static_cast<std::size_t>(unplanned) >= kUnplannedMax)
-    throw RpcFault{kRpcWrongState, std::to_string(kUnplannedMax) + " jobs wait already: cancel one or wait", ""};
+    throw RpcFault{kRpcWrongState, std::to_string(kUnplannedMax) + " jobs wait already: cancel one or wait",
+                   ""};
   if (queue_.waiting().size() >= JobQueue::kWaitingMax)
     throw RpcFault{kRpcWrongState,
-                   std::to_string(JobQueue::kWaitingMax) + " jobs wait to be planned or painted: cancel some", ""};
+                   std::to_string(JobQueue::kWaitingMax) + " jobs wait to be planned or painted: cancel some",
+                   ""};
   return nullptr;
 }
 
@@ -118,7 +123,8 @@ void JobPlanning::submit(const SubmitOrder& order, const Peer& peer, const Reply
   if (!is_taken)
     throw RpcFault{
         kRpcWrongState,
-        std::to_string(FileThread::kQueueMax) + " models wait to be opened: their file system may not answer", ""};
+        std::to_string(FileThread::kQueueMax) + " models wait to be opened: their file system may not answer",
+        ""};
 }
 
 Job& JobPlanning::add_checked(const Job& job, const JobError& refusal) {
@@ -151,8 +157,8 @@ void JobPlanning::stop_current() {
 void JobPlanning::plan_next() {
   if (current_ || is_ending_) return;
   const auto waiting = queue_.waiting();
-  const auto found =
-      std::find_if(waiting.begin(), waiting.end(), [](const Job* job) { return job->state == JobState::kQueued; });
+  const auto found = std::find_if(waiting.begin(), waiting.end(),
+                                  [](const Job* job) { return job->state == JobState::kQueued; });
   if (found == waiting.end()) return;
   Job& job = *queue_.find((*found)->id);
   current_ = Current{job.id, std::nullopt, std::nullopt};
@@ -177,9 +183,9 @@ Job* JobPlanning::current_job(std::int64_t id) {
   return current_ && current_->job == id ? queue_.find(id) : nullptr;
 }
 
-/// What all children of the pipeline have in common: their reports are posted to the socket thread, and are ignored
-/// there if the job is no longer being planned. Each callback has its own copy of post_, because the children's thread
-/// may still call it when this object is gone.
+/// What all children of the pipeline have in common: their reports are posted to the socket thread, and are
+/// ignored there if the job is no longer being planned. Each callback has its own copy of post_, because the
+/// children's thread may still call it when this object is gone.
 ChildOrder JobPlanning::watched_order(const Job& job, std::vector<std::string> arguments,
                                       std::function<void(Job&, ChildOutcome)> on_end) {
   ChildOrder order;
@@ -207,11 +213,12 @@ ChildOrder JobPlanning::watched_order(const Job& job, std::vector<std::string> a
   return order;
 }
 
-/// Which files a model refers to is found by reading it, and reading untrusted bytes is a child's work, done with the
-/// submitter's rights.
+/// Which files a model refers to is found by reading it, and reading untrusted bytes is a child's work, done
+/// with the submitter's rights.
 void JobPlanning::list_files(Job& job) {
-  ChildOrder order = watched_order(job, {"files", "--model", job.model.string()},
-                                   [this](Job& planned, const ChildOutcome& outcome) { copy_files(planned, outcome); });
+  ChildOrder order =
+      watched_order(job, {"files", "--model", job.model.string()},
+                    [this](Job& planned, const ChildOutcome& outcome) { copy_files(planned, outcome); });
   order.owner = ChildOwner{job.uid, job.gid};
   current_->child = children_.start(std::move(order));
 }
@@ -226,26 +233,27 @@ void JobPlanning::copy_files(Job& job, const ChildOutcome& outcome) {
   } catch (const Json::exception&) {
     return fail(job, {"", "the pipeline gave no list of the model's files"});
   }
-  current_->copy = copies_.run([this, post = post_, id = job.id, model = job.model, folder = job.folder, uid = job.uid,
-                                gid = job.gid, files = std::move(files)](const std::stop_token& stop) {
-    std::optional<ModelCopy> copy;
-    JobError error;
-    try {
-      copy = copy_model(model, files, folder / "model", uid, gid, stop);
-    } catch (const InputError& refusal) {
-      error = {refusal.at(), refusal.sentence()};
-    } catch (const std::exception& failure) {
-      error = {model.string(), std::string("cannot be copied: ") + failure.what()};
-    }
-    post([this, id, copy, error] {
-      Job* planned = current_job(id);
-      if (planned == nullptr) return;
-      if (!copy) return fail(*planned, error);
-      planned->model_copy = copy->model;
-      planned->model_sha256 = copy->sha256;
-      run_pipeline(*planned);
-    });
-  });
+  current_->copy =
+      copies_.run([this, post = post_, id = job.id, model = job.model, folder = job.folder, uid = job.uid,
+                   gid = job.gid, files = std::move(files)](const std::stop_token& stop) {
+        std::optional<ModelCopy> copy;
+        JobError error;
+        try {
+          copy = copy_model(model, files, folder / "model", uid, gid, stop);
+        } catch (const InputError& refusal) {
+          error = {refusal.at(), refusal.sentence()};
+        } catch (const std::exception& failure) {
+          error = {model.string(), std::string("cannot be copied: ") + failure.what()};
+        }
+        post([this, id, copy, error] {
+          Job* planned = current_job(id);
+          if (planned == nullptr) return;
+          if (!copy) return fail(*planned, error);
+          planned->model_copy = copy->model;
+          planned->model_sha256 = copy->sha256;
+          run_pipeline(*planned);
+        });
+      });
   if (!current_->copy) fail(job, {"", "the copies of earlier models have not ended"});
 }
 
@@ -268,7 +276,8 @@ void JobPlanning::finish(Job& job, const ChildOutcome& outcome) {
     job.exposed = job.dry_run ? dots.value("exposed", std::uint64_t{0}) : 0;
     job.skipped = 0;
     for (const auto& [reason, count] : dots.at("skipped").items()) job.skipped += count.get<std::uint64_t>();
-    if (job.skipped + job.exposed > job.placed) throw std::runtime_error("the counts of the report do not add up");
+    if (job.skipped + job.exposed > job.placed)
+      throw std::runtime_error("the counts of the report do not add up");
     job.plan = plan_of_report(report).dump(-1, ' ', false, Json::error_handler_t::replace);
     job.planned_s =
         report.contains("time_s") && report["time_s"].is_object() ? report["time_s"].value("total", 0.) : 0.;
@@ -277,7 +286,8 @@ void JobPlanning::finish(Job& job, const ChildOutcome& outcome) {
   }
   // A part would be put on the table for nothing.
   if (job.placed > 0 && job.exposure_count() == 0)
-    return fail(job, {"", "none of the " + std::to_string(job.placed) + " dots can be exposed: " + main_cause(job)});
+    return fail(
+        job, {"", "none of the " + std::to_string(job.placed) + " dots can be exposed: " + main_cause(job)});
   job.state = job.dry_run ? JobState::kDone : JobState::kReady;
   job.progress = job.dry_run ? 1 : 0;
   job.stage.clear();

@@ -13,9 +13,9 @@
 #include "daemon/server/peer.h"
 #include "daemon/server/pipeline_child.h"
 
-/// From a submitted model to a planned job: a model's files are listed by a child of the pipeline, copied into the
-/// job's folder, and planned by another child, one job at a time. Socket thread only; what children report is posted
-/// there.
+/// From a submitted model to a planned job: a model's files are listed by a child of the pipeline, copied
+/// into the job's folder, and planned by another child, one job at a time. Socket thread only; what children
+/// report is posted there.
 namespace hilbrush {
 
 struct SubmitOrder {

@@ -33,7 +33,8 @@ std::string record_text(const fs::path& file) {
 
 bool is_job_number(const std::string& text) {
   constexpr std::size_t kDigitsMax = 18;  // of an int64_t
-  return !text.empty() && text.size() <= kDigitsMax && text.find_first_not_of("0123456789") == std::string::npos;
+  return !text.empty() && text.size() <= kDigitsMax &&
+         text.find_first_not_of("0123456789") == std::string::npos;
 }
 
 /// A job whose record is lost: its number is taken, so that no new job gets its files.
@@ -49,10 +50,12 @@ Job lost_job(const fs::path& folder) {
 }  // namespace
 
 void forbid(const Job& job, const std::string& why) {
-  throw RpcFault{kRpcWrongState, "job " + std::to_string(job.id) + " is " + job_state_name(job.state) + ": " + why, ""};
+  throw RpcFault{kRpcWrongState,
+                 "job " + std::to_string(job.id) + " is " + job_state_name(job.state) + ": " + why, ""};
 }
 
-JobQueue::JobQueue(fs::path jobs_folder, JobStore& store) : jobs_folder_(std::move(jobs_folder)), store_(store) {}
+JobQueue::JobQueue(fs::path jobs_folder, JobStore& store)
+    : jobs_folder_(std::move(jobs_folder)), store_(store) {}
 
 void JobQueue::changed(Job& job) {
   if (is_final(job.state) && job.ended.empty()) job.ended = utc_now();
@@ -67,8 +70,8 @@ void JobQueue::progressed(Job& job) {
   if (on_change) on_change(job);
 }
 
-/// A store that cannot be written must not keep a cell from being stopped or a dot from being counted: the journal has
-/// what matters, and what could not be written is written later.
+/// A store that cannot be written must not keep a cell from being stopped or a dot from being counted: the
+/// journal has what matters, and what could not be written is written later.
 void JobQueue::keep(const Job& job) {
   try {
     store_.update(job);
@@ -118,8 +121,8 @@ void JobQueue::update_positions() {
 }
 
 void JobQueue::forget_oldest(const Job& spared) {
-  const auto count =
-      std::count_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return is_final(entry.second.state); });
+  const auto count = std::count_if(jobs_.begin(), jobs_.end(),
+                                   [](const auto& entry) { return is_final(entry.second.state); });
   if (static_cast<std::size_t>(count) <= kHistoryMax) return;
   const auto oldest = std::find_if(jobs_.begin(), jobs_.end(), [&](const auto& entry) {
     return is_final(entry.second.state) && &entry.second != &spared && !unkept_.contains(entry.first);

@@ -13,9 +13,9 @@
 #include "daemon/server/job_store.h"
 #include "daemon/server/json_rpc.h"
 
-/// All jobs: their records, their order, and the store that keeps them. What is done to a job is decided by JobPlanning
-/// and JobPainting; they change its fields and report it here. Socket thread only; it never waits for more than the
-/// disk.
+/// All jobs: their records, their order, and the store that keeps them. What is done to a job is decided by
+/// JobPlanning and JobPainting; they change its fields and report it here. Socket thread only; it never waits
+/// for more than the disk.
 namespace hilbrush {
 
 /// @throws RpcFault that says which state of the job forbids what.
@@ -31,9 +31,9 @@ class JobQueue {
   /// `store` outlives it.
   JobQueue(std::filesystem::path jobs_folder, JobStore& store);
 
-  /// Loads the jobs of the daemon's previous run: painting ones are paused, those that were being planned are queued
-  /// again. If the store is new, jobs are found again by the records in their folders. Call once, before the first
-  /// request. @return a sentence for the operator, or nothing.
+  /// Loads the jobs of the daemon's previous run: painting ones are paused, those that were being planned are
+  /// queued again. If the store is new, jobs are found again by the records in their folders. Call once,
+  /// before the first request. @return a sentence for the operator, or nothing.
   std::string restore();
 
   /// Gives the job its id, folder and place at the end of the queue, and stores it. @throws RpcFault

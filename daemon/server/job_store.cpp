@@ -51,8 +51,10 @@ constexpr std::array<const char*, 4> kMigrations{R"(
 )"};
 
 constexpr const char* kColumns =
-    "key, uid, gid, state, model, model_copy, model_sha256, settings, settings_sha256, cell, dry_run, created, placed, "
-    "skipped, exposed, planned_s, error_at, error_message, warnings, rank, copies, copies_done, is_begun, started, "
+    "key, uid, gid, state, model, model_copy, model_sha256, settings, settings_sha256, cell, dry_run, "
+    "created, placed, "
+    "skipped, exposed, planned_s, error_at, error_message, warnings, rank, copies, copies_done, is_begun, "
+    "started, "
     "ended, "
     "own_dots, own_median_s, own_p99_s, measured, plan_summary";
 constexpr int kColumnCount = 30;
@@ -63,8 +65,8 @@ std::string marks() {
   return text;
 }
 
-/// The file holds no jobs that could be used: it may be set aside. All other faults, such as a full disk or missing
-/// rights, leave it as it is.
+/// The file holds no jobs that could be used: it may be set aside. All other faults, such as a full disk or
+/// missing rights, leave it as it is.
 struct DamagedStore : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -86,13 +88,14 @@ void migrate(SQLite::Database& database) {
 }
 
 std::unique_ptr<SQLite::Database> open_checked(const std::filesystem::path& file) {
-  auto database = std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  auto database =
+      std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   database->setBusyTimeout(2000);
   if (const std::string answer = database->execAndGet("PRAGMA quick_check").getString(); answer != "ok")
     throw DamagedStore("it is damaged: " + answer);
   database->exec("PRAGMA journal_mode = WAL");
-  // No sync a commit: the socket thread must not wait for a disk. What a power cut may take of a job's state, its
-  // journal still knows.
+  // No sync a commit: the socket thread must not wait for a disk. What a power cut may take of a job's state,
+  // its journal still knows.
   database->exec("PRAGMA synchronous = NORMAL");
   migrate(*database);
   return database;
@@ -187,7 +190,8 @@ Job read_job(SQLite::Statement& row) {
 /// The database and what SQLite keeps beside it.
 std::filesystem::path set_file_aside(const std::filesystem::path& file) {
   const auto seconds =
-      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
+          .count();
   const std::filesystem::path aside = file.string() + ".damaged-" + std::to_string(seconds);
   std::error_code ignored;
   for (const char* suffix : {"", "-wal", "-shm"})
@@ -213,8 +217,8 @@ JobStore::JobStore(const std::filesystem::path& file) : implementation_(std::mak
   const auto set_aside = [&](const std::string& why) {
     const auto aside = set_file_aside(file);
     is_new_ = true;
-    notice_ = file.string() + " cannot be used (" + why + "); it was set aside as " + aside.filename().string() +
-              ", and the jobs are taken from the records in their folders";
+    notice_ = file.string() + " cannot be used (" + why + "); it was set aside as " +
+              aside.filename().string() + ", and the jobs are taken from the records in their folders";
   };
   const auto refuse = [&](const std::exception& error) {
     throw std::runtime_error(file.string() + ": the job store cannot be used: " + error.what());
@@ -248,16 +252,16 @@ void JobStore::insert(Job& job) {
 }
 
 void JobStore::insert_with_id(const Job& job) {
-  SQLite::Statement statement(*implementation_->database, std::string("INSERT OR IGNORE INTO job (") + kColumns +
-                                                              ", id) VALUES (" + marks() + ", ?)");
+  SQLite::Statement statement(*implementation_->database, std::string("INSERT OR IGNORE INTO job (") +
+                                                              kColumns + ", id) VALUES (" + marks() + ", ?)");
   bind(statement, job);
   statement.bind(kColumnCount + 1, job.id);
   statement.exec();
 }
 
 void JobStore::update(const Job& job) {
-  SQLite::Statement statement(*implementation_->database,
-                              std::string("UPDATE job SET (") + kColumns + ") = (" + marks() + ") WHERE id = ?");
+  SQLite::Statement statement(*implementation_->database, std::string("UPDATE job SET (") + kColumns +
+                                                              ") = (" + marks() + ") WHERE id = ?");
   bind(statement, job);
   statement.bind(kColumnCount + 1, job.id);
   statement.exec();
@@ -287,7 +291,8 @@ std::optional<Job> JobStore::find(std::int64_t id) {
 }
 
 std::optional<Job> JobStore::find_key(const std::string& key) {
-  SQLite::Statement row(*implementation_->database, std::string("SELECT id, ") + kColumns + " FROM job WHERE key = ?");
+  SQLite::Statement row(*implementation_->database,
+                        std::string("SELECT id, ") + kColumns + " FROM job WHERE key = ?");
   row.bind(1, key);
   if (!row.executeStep()) return std::nullopt;
   return read_job(row);

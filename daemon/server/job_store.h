@@ -7,15 +7,15 @@
 
 #include "daemon/server/job.h"
 
-/// Jobs on disk: state/jobs.sqlite, schema version in user_version, older versions migrated at opening. What a job
-/// painted is the journal's to know; here are its state and its terms, and the history. Methods throw
+/// Jobs on disk: state/jobs.sqlite, schema version in user_version, older versions migrated at opening. What
+/// a job painted is the journal's to know; here are its state and its terms, and the history. Methods throw
 /// std::runtime_error when the disk is full or broken. Socket thread only.
 namespace hilbrush {
 
 class JobStore {
  public:
-  /// A file that is not a database, is damaged, or of a newer daemon is set aside under another name, so that the
-  /// daemon starts; notice() then says so. @throws std::runtime_error if no database can be made there.
+  /// A file that is not a database, is damaged, or of a newer daemon is set aside under another name, so that
+  /// the daemon starts; notice() then says so. @throws std::runtime_error if no database can be made there.
   explicit JobStore(const std::filesystem::path& file);
   ~JobStore();
   JobStore(const JobStore&) = delete;

@@ -10,8 +10,8 @@ std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// A cheap look at what stands outside strings, before parsing: values deeper than any of ours only serve to exhaust a
-/// stack, objects with more members only to take time. @return a sentence, or nothing.
+/// A cheap look at what stands outside strings, before parsing: values deeper than any of ours only serve to
+/// exhaust a stack, objects with more members only to take time. @return a sentence, or nothing.
 std::string excess(std::string_view text) {
   std::array<int, kRpcDepthMax + 1> members{};
   std::size_t depth = 0;
@@ -26,7 +26,8 @@ std::string excess(std::string_view text) {
     } else if (c == '"') {
       is_in_string = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > kRpcDepthMax) return "the message is nested more than " + std::to_string(kRpcDepthMax) + " deep";
+      if (++depth > kRpcDepthMax)
+        return "the message is nested more than " + std::to_string(kRpcDepthMax) + " deep";
       members[depth] = 0;
     } else if (c == ']' || c == '}') {
       if (depth > 0) --depth;
@@ -52,13 +53,15 @@ RpcElement element_of(const Json& json) {
     return RpcElement{RpcFault{kRpcInvalidRequest, message, at}, id};
   };
   if (json.value("jsonrpc", Json()) != "2.0") return fault("\"jsonrpc\" must be \"2.0\"", "$.jsonrpc");
-  if (!json.contains("method") || !json["method"].is_string()) return fault("\"method\" must be a string", "$.method");
+  if (!json.contains("method") || !json["method"].is_string())
+    return fault("\"method\" must be a string", "$.method");
   RpcRequest request;
   request.id = id;
   request.is_notification = !has_id;
   request.method = json["method"].get<std::string>();
   if (json.contains("params")) request.params = json["params"];
-  if (!request.params.is_object()) return {RpcFault{kRpcBadParams, "params are given by name, as an object", "$"}, id};
+  if (!request.params.is_object())
+    return {RpcFault{kRpcBadParams, "params are given by name, as an object", "$"}, id};
   return {std::move(request), id};
 }
 
@@ -145,7 +148,8 @@ std::optional<RpcFault> check_schema(const Json& value, const Json& schema, cons
   if (schema.contains("type") && !fits_type(value, schema["type"]))
     return fault("must be " + dump(schema["type"]) + ", not " + type_name(value));
   if (schema.contains("const") && value != schema["const"]) return fault("must be " + dump(schema["const"]));
-  if (schema.contains("enum") && std::find(schema["enum"].begin(), schema["enum"].end(), value) == schema["enum"].end())
+  if (schema.contains("enum") &&
+      std::find(schema["enum"].begin(), schema["enum"].end(), value) == schema["enum"].end())
     return fault("must be one of " + dump(schema["enum"]));
   if (value.is_string()) {
     const auto length = value.get_ref<const std::string&>().size();

@@ -10,8 +10,8 @@
 
 #include "config/rpc_errors.h"
 
-/// JSON-RPC 2.0 messages: text in, requests out; results and faults in, text out. Pure functions, any thread. Bytes are
-/// untrusted.
+/// JSON-RPC 2.0 messages: text in, requests out; results and faults in, text out. Pure functions, any thread.
+/// Bytes are untrusted.
 namespace hilbrush {
 
 using Json = nlohmann::ordered_json;
@@ -30,7 +30,8 @@ struct RpcRequest {
   Json params = Json::object();
 };
 
-/// One element of a message: a request, or the fault that keeps it from being one, with the id if there is one.
+/// One element of a message: a request, or the fault that keeps it from being one, with the id if there is
+/// one.
 struct RpcElement {
   std::variant<RpcRequest, RpcFault> content;
   Json id;
@@ -53,7 +54,8 @@ std::string rpc_fault(const Json& id, const RpcFault& fault);
 std::string rpc_notification(const std::string& method, Json params);
 
 /// Checks `value` against the subset of JSON Schema that the method table uses: type, properties, required,
-/// additionalProperties, enum, const, minLength, maxLength, minimum, maximum. The fault's `at` is the JSON path.
+/// additionalProperties, enum, const, minLength, maxLength, minimum, maximum. The fault's `at` is the JSON
+/// path.
 std::optional<RpcFault> check_schema(const Json& value, const Json& schema, const std::string& at = "$");
 
 }  // namespace hilbrush

@@ -63,7 +63,11 @@ Json job_schema() {
       {"dots",
        {{"type", "object"},
         {"properties",
-         {{"placed", count}, {"exposed", count}, {"in_doubt", count}, {"remaining", count}, {"skipped", count}}},
+         {{"placed", count},
+          {"exposed", count},
+          {"in_doubt", count},
+          {"remaining", count},
+          {"skipped", count}}},
         {"description", "placed = exposed + in_doubt + remaining + skipped"}}},
       {"stage", nullable("string", "what is being done")},
       {"progress", typed("number", "0 to 1: of the stage while planning, of the dots while painting")},
@@ -74,9 +78,10 @@ Json job_schema() {
         {"properties", {{"at", {{"type", "string"}}}, {"message", {{"type", "string"}}}}}}},
       {"in_doubt", typed("array", "indices of the dots that may have been exposed, at most 1000")},
       {"warnings", typed("array", "sentences of the pipeline")},
-      {"plan", nullable("object",
-                        "once planned: size_mm, min_mm, max_mm of the object as it stands on the post, the causes of "
-                        "skipped dots with count and text, and the suggestion or null")},
+      {"plan",
+       nullable("object",
+                "once planned: size_mm, min_mm, max_mm of the object as it stands on the post, the causes of "
+                "skipped dots with count and text, and the suggestion or null")},
       {"model_copy", nullable("string", "the model in the job's folder")},
       {"settings", typed("object", "all settings, defaults filled in")},
       {"created", typed("string", "ISO 8601, UTC")},
@@ -86,30 +91,34 @@ Json job_schema() {
       {"copies", typed("integer", "parts to paint; dots are those of the present one")},
       {"copies_done", typed("integer", "parts that are painted")},
       {"position", nullable("integer", "place in the queue, from 1")},
-      {"needs_part_in_place", typed("boolean", "job.start or job.resume must confirm that the part is in its place")},
-      {"timing",
-       nullable("object",
-                "the time that Hilbrush itself adds to each dot: dots counted, own_ms median, p99; and what the moves "
-                "took, measured, as it may stand in a cell file, with measured_moves that each factor is from, and "
-                "measured_is_enough: false if these are too few for a cell file")}};
+      {"needs_part_in_place",
+       typed("boolean", "job.start or job.resume must confirm that the part is in its place")},
+      {"timing", nullable("object",
+                          "the time that Hilbrush itself adds to each dot: dots counted, own_ms median, p99; "
+                          "and what the moves "
+                          "took, measured, as it may stand in a cell file, with measured_moves that each "
+                          "factor is from, and "
+                          "measured_is_enough: false if these are too few for a cell file")}};
   return {{"type", "object"}, {"properties", std::move(properties)}};
 }
 
 Json cell_schema() {
-  return {{"type", "object"},
-          {"properties",
-           {{"state",
-             {{"type", "string"}, {"enum", {"stopped", "clearing", "idle", "arming", "armed", "homing", "painting"}}}},
-            {"laser", {{"type", "string"}, {"enum", {"off", "on", "unconfirmed"}}}},
-            {"interlock", {{"type", "string"}, {"enum", {"closed", "open"}}}},
-            {"job", nullable("string", "the job that is being painted")},
-            {"reason", nullable("string", "why the cell is stopped")},
-            {"joints", typed("object", "measured; the unit is in the key")},
-            {"devices", typed("object", "state and fault of each device")},
-            {"name", typed("string", "of the cell file")},
-            {"sha256", typed("string", "of the cell file")},
-            {"simulated", typed("boolean", "no real device moves")},
-            {"time_scale", typed("number", "wall seconds of one simulated second; 0: as fast as possible")}}}};
+  return {
+      {"type", "object"},
+      {"properties",
+       {{"state",
+         {{"type", "string"},
+          {"enum", {"stopped", "clearing", "idle", "arming", "armed", "homing", "painting"}}}},
+        {"laser", {{"type", "string"}, {"enum", {"off", "on", "unconfirmed"}}}},
+        {"interlock", {{"type", "string"}, {"enum", {"closed", "open"}}}},
+        {"job", nullable("string", "the job that is being painted")},
+        {"reason", nullable("string", "why the cell is stopped")},
+        {"joints", typed("object", "measured; the unit is in the key")},
+        {"devices", typed("object", "state and fault of each device")},
+        {"name", typed("string", "of the cell file")},
+        {"sha256", typed("string", "of the cell file")},
+        {"simulated", typed("boolean", "no real device moves")},
+        {"time_scale", typed("number", "wall seconds of one simulated second; 0: as fast as possible")}}}};
 }
 
 std::string id_of(const Json& params) {
@@ -152,7 +161,8 @@ Job& cancel_job(const Jobs& jobs, const std::string& id) {
 
 }  // namespace
 
-MethodTable::MethodTable(const Jobs& jobs, CellController& controller, AuditLog& audit, std::function<Json()> info)
+MethodTable::MethodTable(const Jobs& jobs, CellController& controller, AuditLog& audit,
+                         std::function<Json()> info)
     : audit_(audit) {
   add_job_acts(jobs);
   add_job_views(jobs.queue);
@@ -170,24 +180,27 @@ void MethodTable::add_job_acts(const Jobs& jobs) {
                           reply.result(job_result(act(given, caller)));
                         }});
   };
-  const Json submit_params = object_schema(
-      {{"model",
-        {{"type", "string"},
-         {"minLength", 1},
-         {"maxLength", 4096},
-         {"description", "absolute path, read with the submitter's rights"}}},
-       {"settings", typed("object", "see the job file: dpi or dots, size_mm or units_mm, ...")},
-       {"dry_run", typed("boolean", "compute the whole job, open no device")},
-       {"key",
-        {{"type", "string"}, {"maxLength", 200}, {"description", "idempotency key: the same key is the same job"}}},
-       {"copies",
-        {{"type", "integer"},
-         {"minimum", 1},
-         {"maximum", JobPlanning::kCopiesMax},
-         {"description", "parts to paint, one after another; default 1"}}}},
-      {"model"});
-  methods_.push_back({"job.submit", "Takes a model; answered when it was found readable, the job is queued.", true,
-                      submit_params, job, [jobs](const Json& given, const Caller& caller, const Reply& reply) {
+  const Json submit_params =
+      object_schema({{"model",
+                      {{"type", "string"},
+                       {"minLength", 1},
+                       {"maxLength", 4096},
+                       {"description", "absolute path, read with the submitter's rights"}}},
+                     {"settings", typed("object", "see the job file: dpi or dots, size_mm or units_mm, ...")},
+                     {"dry_run", typed("boolean", "compute the whole job, open no device")},
+                     {"key",
+                      {{"type", "string"},
+                       {"maxLength", 200},
+                       {"description", "idempotency key: the same key is the same job"}}},
+                     {"copies",
+                      {{"type", "integer"},
+                       {"minimum", 1},
+                       {"maximum", JobPlanning::kCopiesMax},
+                       {"description", "parts to paint, one after another; default 1"}}}},
+                    {"model"});
+  methods_.push_back({"job.submit", "Takes a model; answered when it was found readable, the job is queued.",
+                      true, submit_params, job,
+                      [jobs](const Json& given, const Caller& caller, const Reply& reply) {
                         jobs.planning.submit(
                             {given.at("model").get<std::string>(), given.value("settings", Json::object()),
                              given.value("dry_run", false), given.value("key", ""), given.value("copies", 1)},
@@ -208,7 +221,8 @@ void MethodTable::add_job_acts(const Jobs& jobs) {
             return jobs.painting.resume(id_of(given), given.value("in_doubt", "leave") == "expose",
                                         given.value("part_in_place", false));
           });
-  const Json position = {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000000}, {"description", "1: the next"}};
+  const Json position = {
+      {"type", "integer"}, {"minimum", 1}, {"maximum", 1000000}, {"description", "1: the next"}};
   add_act("job.move", "Gives a waiting job another place in the queue.",
           object_schema({{"id", id_schema()}, {"position", position}}, {"id", "position"}),
           [jobs](const Json& given, const Caller&) -> Job& {
@@ -220,20 +234,23 @@ void MethodTable::add_job_acts(const Jobs& jobs) {
 
 void MethodTable::add_job_views(JobQueue& queue) {
   const Json job = result_with("job", reference("Job"));
-  methods_.push_back(
-      {"job.get", "One job.", false, job_params(), job, [&queue](const Json& given, const Caller&, const Reply& reply) {
-         reply.result(job_result(queue.get(id_of(given))));
-       }});
+  methods_.push_back({"job.get", "One job.", false, job_params(), job,
+                      [&queue](const Json& given, const Caller&, const Reply& reply) {
+                        reply.result(job_result(queue.get(id_of(given))));
+                      }});
   Json page = result_with("jobs", {{"type", "array"}, {"items", reference("Job")}});
   page["properties"]["next"] =
       nullable("string", "the last job of this page, if more follow: they come with it as \"after\"");
   methods_.push_back(
       {"job.list",
-       "A page of the jobs, the newest first; or of those that wait, in their order. It ends before it gets large.",
+       "A page of the jobs, the newest first; or of those that wait, in their order. It ends before it gets "
+       "large.",
        false,
        object_schema(
-           {{"limit", {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000}, {"description", "default 100"}}},
-            {"order", {{"type", "string"}, {"enum", {"newest", "queue"}}, {"description", "default: newest"}}},
+           {{"limit",
+             {{"type", "integer"}, {"minimum", 1}, {"maximum", 1000}, {"description", "default 100"}}},
+            {"order",
+             {{"type", "string"}, {"enum", {"newest", "queue"}}, {"description", "default: newest"}}},
             {"after", id_schema()}},
            {}),
        std::move(page), [&queue](const Json& given, const Caller&, const Reply& reply) {
@@ -243,22 +260,26 @@ void MethodTable::add_job_views(JobQueue& queue) {
          else
            for (auto entry = queue.jobs().rbegin(); entry != queue.jobs().rend(); ++entry)
              listed.push_back(&entry->second);
-         const auto after = given.contains("after") ? &queue.get(given.at("after").get<std::string>()) : nullptr;
+         const auto after =
+             given.contains("after") ? &queue.get(given.at("after").get<std::string>()) : nullptr;
          reply.result(page_of(listed, after, given.value("limit", std::size_t{100})));
        }});
   Json watched = result_with("job", reference("Job"));
   watched["properties"]["seq"] =
-      typed("integer", "of this state; job.update notifications that follow have higher ones, some may be passed over");
-  methods_.push_back(
-      {"job.watch",
-       "The job now, and from now on a job.update notification {seq, job} for each change, over this connection.",
-       false, job_params(), watched, [&queue](const Json& given, const Caller& caller, const Reply& reply) {
-         const Job& found = queue.get(id_of(given));
-         caller.watch(found.id);
-         reply.result({{"seq", found.seq}, {"job", job_to_json(found)}});
-       }});
-  methods_.push_back({"job.unwatch", "No more job.update notifications of this job over this connection.", false,
-                      job_params(), job, [&queue](const Json& given, const Caller& caller, const Reply& reply) {
+      typed("integer",
+            "of this state; job.update notifications that follow have higher ones, some may be passed over");
+  methods_.push_back({"job.watch",
+                      "The job now, and from now on a job.update notification {seq, job} for each change, "
+                      "over this connection.",
+                      false, job_params(), watched,
+                      [&queue](const Json& given, const Caller& caller, const Reply& reply) {
+                        const Job& found = queue.get(id_of(given));
+                        caller.watch(found.id);
+                        reply.result({{"seq", found.seq}, {"job", job_to_json(found)}});
+                      }});
+  methods_.push_back({"job.unwatch", "No more job.update notifications of this job over this connection.",
+                      false, job_params(), job,
+                      [&queue](const Json& given, const Caller& caller, const Reply& reply) {
                         const Job& found = queue.get(id_of(given));
                         caller.unwatch(found.id);
                         reply.result(job_result(found));
@@ -270,20 +291,23 @@ void MethodTable::add_cell_methods(CellController& controller) {
   methods_.push_back(
       {"cell.status", "The cell's state, laser, interlock, joints and devices.", false, no_params(), cell,
        [&controller](const Json&, const Caller&, const Reply& reply) { reply.result(controller.status()); }});
-  methods_.push_back({"cell.stop", "Laser off, axes stopped, at once and latched; a painting job is paused.", true,
-                      no_params(), cell, [&controller](const Json&, const Caller& caller, Reply reply) {
+  methods_.push_back({"cell.stop", "Laser off, axes stopped, at once and latched; a painting job is paused.",
+                      true, no_params(), cell, [&controller](const Json&, const Caller& caller, Reply reply) {
                         controller.stop("stopped by " + caller.peer.user, std::move(reply));
                       }});
-  methods_.push_back({"cell.clear", "Takes a stop back, if there is one; nothing moves.", true, no_params(), cell,
-                      [&controller](const Json&, const Caller&, Reply reply) { controller.clear(std::move(reply)); }});
-  methods_.push_back({"cell.arm", "Axes ready, laser armed for one job; answered when its start delay is over.", true,
-                      no_params(), cell,
-                      [&controller](const Json&, const Caller&, Reply reply) { controller.arm(std::move(reply)); }});
   methods_.push_back(
-      {"cell.home",
-       "All axes to their home positions in the dark: up first, then the table, then the arm; answered when there.",
-       true, no_params(), cell,
-       [&controller](const Json&, const Caller&, Reply reply) { controller.home(std::move(reply)); }});
+      {"cell.clear", "Takes a stop back, if there is one; nothing moves.", true, no_params(), cell,
+       [&controller](const Json&, const Caller&, Reply reply) { controller.clear(std::move(reply)); }});
+  methods_.push_back(
+      {"cell.arm", "Axes ready, laser armed for one job; answered when its start delay is over.", true,
+       no_params(), cell,
+       [&controller](const Json&, const Caller&, Reply reply) { controller.arm(std::move(reply)); }});
+  methods_.push_back({"cell.home",
+                      "All axes to their home positions in the dark: up first, then the table, then the arm; "
+                      "answered when there.",
+                      true, no_params(), cell, [&controller](const Json&, const Caller&, Reply reply) {
+                        controller.home(std::move(reply));
+                      }});
 }
 
 void MethodTable::add_system_methods(std::function<Json()> info) {
@@ -326,7 +350,8 @@ namespace {
 
 std::optional<RpcFault> missing_right(const Method& method, const Peer& peer) {
   const Right needed = method.right();
-  if (needed == Right::kNone || (needed == Right::kLook ? peer.may_look : peer.may_operate)) return std::nullopt;
+  if (needed == Right::kNone || (needed == Right::kLook ? peer.may_look : peer.may_operate))
+    return std::nullopt;
   std::string sentence;
   if (peer.user.empty())
     sentence = "this connection has not said who it is: session.open with a token comes first";
@@ -358,8 +383,9 @@ bool MethodTable::is_open_to_strangers(const std::string& name) const {
 void MethodTable::dispatch(const RpcRequest& request, const Caller& caller, Reply reply) const {
   const Method* method = find(request.method);
   if (method == nullptr)
-    return reply.fault({kRpcUnknownMethod,
-                        "there is no method \"" + request.method.substr(0, 60) + "\"; rpc.discover lists them", ""});
+    return reply.fault(
+        {kRpcUnknownMethod,
+         "there is no method \"" + request.method.substr(0, 60) + "\"; rpc.discover lists them", ""});
   const bool is_stranger = caller.peer.user.empty();  // what they may not do anyway is not worth a line each
   if (method->is_act && !is_stranger) {
     const auto record = [this, peer = caller.peer, name = method->name, params = request.params](

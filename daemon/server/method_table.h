@@ -11,9 +11,9 @@
 #include "daemon/server/job_queue.h"
 #include "daemon/server/json_rpc.h"
 
-/// Every method of the socket in one table: its name, what it does, the schemas of its parameters and result, and its
-/// handler. Requests are dispatched and checked by it, and rpc.discover prints it, so that the three cannot differ.
-/// Socket thread only.
+/// Every method of the socket in one table: its name, what it does, the schemas of its parameters and result,
+/// and its handler. Requests are dispatched and checked by it, and rpc.discover prints it, so that the three
+/// cannot differ. Socket thread only.
 namespace hilbrush {
 
 /// The connection a request came over.
@@ -32,7 +32,8 @@ struct Method {
   bool is_act = false;  ///< recorded in the audit log
   Json params, result;  ///< JSON schemas
   std::function<void(const Json& params, const Caller& caller, Reply reply)> handler;
-  /// Looking needs the right to look, acts need the right to operate; but a peer that may look may also stop the cell.
+  /// Looking needs the right to look, acts need the right to operate; but a peer that may look may also stop
+  /// the cell.
   Right right() const;
 };
 

@@ -56,7 +56,9 @@ std::vector<gid_t> groups_of(uid_t uid, gid_t gid) {
 /// opening a pipe waits for its writer.
 int open_as_peer(const fs::path& file, uid_t uid, gid_t gid) {
   const AsPeer peer(uid, gid);
-  const auto refuse = [&] { throw InputError(file.string(), std::string("cannot be read: ") + std::strerror(errno)); };
+  const auto refuse = [&] {
+    throw InputError(file.string(), std::string("cannot be read: ") + std::strerror(errno));
+  };
   const OpenFile place(::open(file.c_str(), O_PATH | O_CLOEXEC));
   if (place.get() < 0) refuse();
   struct stat status {};
@@ -80,8 +82,8 @@ fs::path place_below(const fs::path& file, const fs::path& base) {
   return relative;
 }
 
-std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintmax_t bytes_left, const fs::path& source,
-                         const std::stop_token& stop) {
+std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintmax_t bytes_left,
+                         const fs::path& source, const std::stop_token& stop) {
   fs::create_directories(to.parent_path());
   const OpenFile out(::open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640));
   if (out.get() < 0)
@@ -89,18 +91,21 @@ std::uintmax_t copy_file(int from, const fs::path& to, Sha256& hash, std::uintma
   std::vector<char> block(std::size_t{1} << 18);
   std::uintmax_t copied = 0;
   for (;;) {
-    if (stop.stop_requested()) throw InputError(source.string(), "is not copied any further: the job was cancelled");
+    if (stop.stop_requested())
+      throw InputError(source.string(), "is not copied any further: the job was cancelled");
     const ssize_t count = ::read(from, block.data(), block.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throw InputError(source.string(), std::string("cannot be read: ") + std::strerror(errno));
     if (count == 0) return copied;
     copied += static_cast<std::uintmax_t>(count);
     if (copied > bytes_left)
-      throw InputError(source.string(), "makes the model larger than " + std::to_string(kModelBytesMax >> 20) + " MB");
+      throw InputError(source.string(),
+                       "makes the model larger than " + std::to_string(kModelBytesMax >> 20) + " MB");
     const std::string_view bytes(block.data(), static_cast<std::size_t>(count));
     hash.update(bytes);
     if (!write_all(out.get(), bytes))
-      throw InputError(source.string(), std::string("the job's copy cannot be written: ") + std::strerror(errno));
+      throw InputError(source.string(),
+                       std::string("the job's copy cannot be written: ") + std::strerror(errno));
   }
 }
 
@@ -127,8 +132,8 @@ void check_readable(const fs::path& file, uid_t uid, gid_t gid) {
   const OpenFile open(open_as_peer(file, uid, gid));
 }
 
-ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, const fs::path& target, uid_t uid,
-                     gid_t gid, const std::stop_token& stop) {
+ModelCopy copy_model(const fs::path& model, const std::vector<fs::path>& files, const fs::path& target,
+                     uid_t uid, gid_t gid, const std::stop_token& stop) {
   if (files.size() > kModelFilesMax)
     throw InputError(model.string(), "refers to more than " + std::to_string(kModelFilesMax) + " files");
   std::error_code ignored;

@@ -69,12 +69,14 @@ std::vector<gid_t> groups_of(const ChildOwner& owner) {
   std::vector<gid_t> groups(64);
   int count = static_cast<int>(groups.size());
   const passwd* user = ::getpwuid(owner.uid);
-  if (user == nullptr || ::getgrouplist(user->pw_name, owner.gid, groups.data(), &count) < 0) return {owner.gid};
+  if (user == nullptr || ::getgrouplist(user->pw_name, owner.gid, groups.data(), &count) < 0)
+    return {owner.gid};
   groups.resize(static_cast<std::size_t>(count));
   return groups;
 }
 
-/// Everything that the new process needs, prepared by the old one: after fork only async-signal-safe calls are made.
+/// Everything that the new process needs, prepared by the old one: after fork only async-signal-safe calls
+/// are made.
 struct Launch {
   std::vector<char*> argv;
   int null_fd, out_fd, err_fd;
@@ -267,7 +269,8 @@ void PipelineChildren::spawn(ChildId id, ChildOrder order) {
     const Descriptor null(::open("/dev/null", O_RDWR | O_CLOEXEC));
     if (null.get() < 0) throw_system_error("/dev/null cannot be opened");
     std::string program = program_.string();
-    Launch launch{{program.data()}, null.get(), out.write_end.get(), err.write_end.get(), ::getpid(), std::nullopt, {}};
+    Launch launch{{program.data()}, null.get(), out.write_end.get(), err.write_end.get(), ::getpid(),
+                  std::nullopt,     {}};
     for (auto& argument : child->order.arguments) launch.argv.push_back(argument.data());
     launch.argv.push_back(nullptr);
     if (child->order.owner && ::geteuid() == 0 && child->order.owner->uid != 0) {
@@ -364,9 +367,11 @@ void PipelineChildren::check_limits(Child& child) {
   if (child.is_killed) return;
   const std::chrono::duration<double> silence = Steady::now() - child.last_heard;
   if (silence.count() > limits_.silence_s)
-    kill_child(child, "the pipeline made no progress for " + number(limits_.silence_s, 3) + " s and was killed");
+    kill_child(child,
+               "the pipeline made no progress for " + number(limits_.silence_s, 3) + " s and was killed");
   else if (resident_bytes(child.pid) > limits_.resident_bytes)
-    kill_child(child, "the pipeline needed more than " + number(static_cast<double>(limits_.resident_bytes >> 20), 3) +
+    kill_child(child, "the pipeline needed more than " +
+                          number(static_cast<double>(limits_.resident_bytes >> 20), 3) +
                           " MB of memory and was killed; a smaller model or fewer dots may help");
 }
 
@@ -381,7 +386,8 @@ void PipelineChildren::kill_child(Child& child, std::string sentence) {
 /// @return true once the child is gone and its end is reported.
 bool PipelineChildren::reap(Child& child) {
   siginfo_t info{};
-  if (::waitid(P_PID, static_cast<id_t>(child.pid), &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
+  if (::waitid(P_PID, static_cast<id_t>(child.pid), &info, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+      info.si_pid == 0)
     return false;
   ::kill(-child.pid, SIGKILL);  // its own children too; before its id can belong to another process
   int status = 0;
@@ -401,8 +407,8 @@ bool PipelineChildren::reap(Child& child) {
     else if (WEXITSTATUS(status) == 127 && said.empty() && outcome.error.empty())
       outcome.error = program_.string() + " cannot be started";
     else if (!outcome.is_ok && outcome.error.empty())
-      outcome.error =
-          "the pipeline ended with exit code " + std::to_string(WEXITSTATUS(status)) + " and without a result" + tail;
+      outcome.error = "the pipeline ended with exit code " + std::to_string(WEXITSTATUS(status)) +
+                      " and without a result" + tail;
   }
   child.order.on_end(std::move(outcome));
   return true;

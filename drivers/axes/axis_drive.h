@@ -6,9 +6,9 @@
 
 namespace hilbrush {
 
-/// One positioning drive behind a fieldbus, in its own steps. Each call is a few bounded exchanges on the wire and
-/// throws DriverError. `give_up`, asked between the exchanges of a handshake, ends it with a DriverError, so that a
-/// stop never waits longer than one exchange.
+/// One positioning drive behind a fieldbus, in its own steps. Each call is a few bounded exchanges on the
+/// wire and throws DriverError. `give_up`, asked between the exchanges of a handshake, ends it with a
+/// DriverError, so that a stop never waits longer than one exchange.
 class AxisDrive {
  public:
   using GiveUp = std::function<bool()>;
@@ -37,11 +37,11 @@ class AxisDrive {
   virtual void enable(const GiveUp& give_up) = 0;
   virtual void disable() = 0;
   virtual void home(const GiveUp& give_up) = 0;
-  /// Writes the part of a move that does not start it: nothing moves, now or later, by this alone. False if this drive
-  /// has no such part. What fails leaves the drive with data that the next whole order overwrites.
+  /// Writes the part of a move that does not start it: nothing moves, now or later, by this alone. False if
+  /// this drive has no such part. What fails leaves the drive with data that the next whole order overwrites.
   virtual bool write_ahead(const Move& move, const GiveUp& give_up) = 0;
-  /// Returns when the drive has taken the order. `is_ahead`: write_ahead() has written this very move, and nothing was
-  /// ordered since; only the rest of it is sent.
+  /// Returns when the drive has taken the order. `is_ahead`: write_ahead() has written this very move, and
+  /// nothing was ordered since; only the rest of it is sent.
   virtual void start(const Move& move, bool is_ahead, const GiveUp& give_up) = 0;
   virtual void stop() = 0;
   virtual void clear_fault() = 0;

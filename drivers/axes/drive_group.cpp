@@ -11,8 +11,9 @@
 namespace hilbrush {
 namespace {
 
-constexpr double kIdlePollS = 0.1;        ///< wall
-constexpr double kReadyPollS = 0.01;      ///< cell: an axis that drifts from its place is seen before the next dot
+constexpr double kIdlePollS = 0.1;  ///< wall
+constexpr double kReadyPollS =
+    0.01;  ///< cell: an axis that drifts from its place is seen before the next dot
 constexpr double kReadyPollMinS = 0.001;  ///< wall
 constexpr double kArrivalPollS = 0.0005;  ///< wall, on top of what the exchanges take
 constexpr double kHandshakeS = 0.1;       ///< wall: what a stop waits for a handshake to end
@@ -143,7 +144,9 @@ void DriveGroup<N>::clear_fault() {
       if (drive->read().has_fault) drive->clear_fault();
     const double deadline_s = clock_.now_s() + 1;
     for (Readings readings = read_all();; readings = read_all()) {
-      if (std::none_of(readings.begin(), readings.end(), [](const auto& reading) { return reading.has_fault; })) break;
+      if (std::none_of(readings.begin(), readings.end(),
+                       [](const auto& reading) { return reading.has_fault; }))
+        break;
       if (clock_.now_s() > deadline_s) check_alarms(readings);
     }
   } catch (const DriverError& error) {
@@ -175,8 +178,8 @@ AxisDrive::Move DriveGroup<N>::order(std::size_t axis, double target) const {
   const auto steps = [&](double units) {
     return static_cast<std::uint32_t>(std::clamp(units * options.scale.steps_per_unit, 1., 4e9));
   };
-  return {static_cast<std::int32_t>(std::lround(options.scale.to_device(target))), steps(options.bounds.speed_max),
-          steps(options.bounds.acceleration_max)};
+  return {static_cast<std::int32_t>(std::lround(options.scale.to_device(target))),
+          steps(options.bounds.speed_max), steps(options.bounds.acceleration_max)};
 }
 
 template <std::size_t N>
@@ -204,7 +207,8 @@ void DriveGroup<N>::move_to(const Positions& target, double settle_s) {
       is_new[i] = !group_.is_in_position || moves[i].target != target_[i].target;
       is_ahead[i] = ahead_ && ahead_->is_written[i] && ahead_->moves[i] == moves[i];
     }
-    // An order to stay at the target, which only restarts settling, leaves what was sent ahead for the next move.
+    // An order to stay at the target, which only restarts settling, leaves what was sent ahead for the next
+    // move.
     if (std::find(is_new.begin(), is_new.end(), true) != is_new.end()) ahead_.reset();
     group_.arrival_s = clock_.now_s() + travel_s(target) + settle_s;
     target_ = moves;
@@ -342,7 +346,8 @@ bool DriveGroup<N>::is_at_target(const Readings& readings) const {
     const AxisDrive::Reading& reading = readings[i];
     const double target = target_[i].target;
     const double window = std::max(1., options_[i].window * options_[i].scale.steps_per_unit);
-    if (!reading.has_arrived || !reading.is_enabled || std::abs(reading.position - target) > window) return false;
+    if (!reading.has_arrived || !reading.is_enabled || std::abs(reading.position - target) > window)
+      return false;
     if (reading.setpoint && std::abs(*reading.setpoint - target) > 0.5) return false;
   }
   return true;
@@ -392,7 +397,8 @@ template <std::size_t N>
 void DriveGroup<N>::poll() {
   std::unique_lock lock(mutex_);
   while (is_polling_) {
-    poll_asked_.wait_until(lock, deadline_in(poll_interval_s()), [this] { return !is_polling_ || is_poll_due_; });
+    poll_asked_.wait_until(lock, deadline_in(poll_interval_s()),
+                           [this] { return !is_polling_ || is_poll_due_; });
     if (!is_polling_) return;
     is_poll_due_ = false;
     if (group_.state == DeviceState::kFault) continue;

@@ -18,14 +18,14 @@
 
 namespace hilbrush {
 
-/// N drives on fieldbuses as one group. A polling thread reads the drives: as fast as they answer while an axis is
-/// under way, a few times a second at rest. In position: after the order was taken, every drive says so, its set-point
-/// (if it reports one) is the target, and its position is within the window, in every reading for the settle time; a
-/// reading counts only if it was begun after the order had been taken, because before that a drive may still report
-/// the end of its last move.
+/// N drives on fieldbuses as one group. A polling thread reads the drives: as fast as they answer while an
+/// axis is under way, a few times a second at rest. In position: after the order was taken, every drive says
+/// so, its set-point (if it reports one) is the target, and its position is within the window, in every
+/// reading for the settle time; a reading counts only if it was begun after the order had been taken, because
+/// before that a drive may still report the end of its last move.
 ///
-/// prepare() leaves the next target to the polling thread, which writes ahead what starts nothing of the axes that will
-/// move; a move_to() of that very target then sends only the rest.
+/// prepare() leaves the next target to the polling thread, which writes ahead what starts nothing of the axes
+/// that will move; a move_to() of that very target then sends only the rest.
 template <std::size_t N>
 class DriveGroup final : public AxisGroup<N> {
  public:

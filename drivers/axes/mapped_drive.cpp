@@ -21,7 +21,8 @@ std::vector<std::uint16_t> encode(const MappedRegister& reg, std::uint32_t value
 }
 
 std::int64_t decode(const MappedRegister& reg, std::span<const std::uint16_t> words) {
-  if (reg.words == 1) return reg.is_signed ? static_cast<std::int16_t>(words[0]) : static_cast<std::int64_t>(words[0]);
+  if (reg.words == 1)
+    return reg.is_signed ? static_cast<std::int16_t>(words[0]) : static_cast<std::int64_t>(words[0]);
   const std::uint32_t high = reg.is_high_word_first ? words[0] : words[1];
   const std::uint32_t low = reg.is_high_word_first ? words[1] : words[0];
   const std::uint32_t value = high << 16 | low;
@@ -94,7 +95,8 @@ AxisDrive::Reading MappedDrive::read() {
   reading.has_arrived = std::all_of(map_.arrived.begin(), map_.arrived.end(), holds);
   reading.is_homed = std::all_of(map_.homed.begin(), map_.homed.end(), holds);
   reading.position = register_map::to_steps(map_.registers[map_.position], value(map_.position));
-  if (map_.setpoint) reading.setpoint = register_map::to_steps(map_.registers[*map_.setpoint], value(*map_.setpoint));
+  if (map_.setpoint)
+    reading.setpoint = register_map::to_steps(map_.registers[*map_.setpoint], value(*map_.setpoint));
   if (reading.has_fault && map_.alarm) reading.alarm = static_cast<std::uint32_t>(value_of(*map_.alarm));
   return reading;
 }
@@ -122,8 +124,9 @@ void MappedDrive::wait(const RegisterStep& step, const char* gerund, const GiveU
     if ((value & step.mask) == step.value) return;
     if (give_up()) throw DriverError("the axis was stopped");
     if (is_late)
-      throw DriverError(bus_->name() + " unit " + std::to_string(unit_) + ": " + map_.registers[step.reg].name +
-                        " stays 0x" + hex_text(value, 4) + " while " + gerund + bus_->messages().text());
+      throw DriverError(bus_->name() + " unit " + std::to_string(unit_) + ": " +
+                        map_.registers[step.reg].name + " stays 0x" + hex_text(value, 4) + " while " +
+                        gerund + bus_->messages().text());
     std::this_thread::sleep_for(std::chrono::duration<double>(kWaitPollS));
   }
 }
@@ -141,10 +144,10 @@ void MappedDrive::run(const std::vector<RegisterStep>& steps, const char* gerund
     else if (step.source == Source::kConstant || move == nullptr)
       write(reg, step.value);
     else
-      write(reg,
-            register_map::to_register(reg, step.source == Source::kTarget  ? static_cast<double>(move->target)
-                                           : step.source == Source::kSpeed ? static_cast<double>(move->speed)
-                                                                           : static_cast<double>(move->acceleration)));
+      write(reg, register_map::to_register(
+                     reg, step.source == Source::kTarget  ? static_cast<double>(move->target)
+                          : step.source == Source::kSpeed ? static_cast<double>(move->speed)
+                                                          : static_cast<double>(move->acceleration)));
   }
 }
 

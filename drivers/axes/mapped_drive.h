@@ -25,10 +25,12 @@ double to_steps(const MappedRegister& reg, std::int64_t value);
 
 }  // namespace register_map
 
-/// A drive that a register map describes: its handshakes are lists of writes and waits. Its times are the cell's.
+/// A drive that a register map describes: its handshakes are lists of writes and waits. Its times are the
+/// cell's.
 class MappedDrive final : public AxisDrive {
  public:
-  MappedDrive(std::shared_ptr<ModbusBus> bus, const ModbusAxisOptions& options, RegisterMap map, Clock& clock);
+  MappedDrive(std::shared_ptr<ModbusBus> bus, const ModbusAxisOptions& options, RegisterMap map,
+              Clock& clock);
 
   void connect() override;
   void close() noexcept override { bus_->close(); }
@@ -46,7 +48,8 @@ class MappedDrive final : public AxisDrive {
  private:
   std::int64_t value_of(std::size_t reg);
   void write(const MappedRegister& reg, std::uint32_t value);
-  void run(const std::vector<RegisterStep>& steps, const char* gerund, const Move* move, const GiveUp& give_up);
+  void run(const std::vector<RegisterStep>& steps, const char* gerund, const Move* move,
+           const GiveUp& give_up);
   void wait(const RegisterStep& step, const char* gerund, const GiveUp& give_up);
 
   const std::shared_ptr<ModbusBus> bus_;

@@ -42,8 +42,8 @@ std::string words_text(std::span<const std::uint16_t> words) {
 }
 
 std::string request_text(const char* verb, int unit, int address, std::size_t count) {
-  return "unit " + std::to_string(unit) + ' ' + verb + " 0x" + hex_text(static_cast<std::uint32_t>(address), 4) +
-         " x " + std::to_string(count);
+  return "unit " + std::to_string(unit) + ' ' + verb + " 0x" +
+         hex_text(static_cast<std::uint32_t>(address), 4) + " x " + std::to_string(count);
 }
 
 }  // namespace

@@ -13,9 +13,10 @@ struct _modbus;
 
 namespace hilbrush {
 
-/// A Modbus master on one RS-485 bus or TCP connection, by libmodbus. One exchange at a time, from any thread; each
-/// ends within its time-out. Reads are tried a second time after silence or a damaged answer; writes never are, because
-/// whether they were carried out is not known. An answer that comes too late is thrown away before the next request.
+/// A Modbus master on one RS-485 bus or TCP connection, by libmodbus. One exchange at a time, from any
+/// thread; each ends within its time-out. Reads are tried a second time after silence or a damaged answer;
+/// writes never are, because whether they were carried out is not known. An answer that comes too late is
+/// thrown away before the next request.
 class ModbusBus {
  public:
   static constexpr double kReplyS = 0.2;  ///< wall
@@ -29,7 +30,8 @@ class ModbusBus {
   void close() noexcept;
   bool is_open() const { return is_open_.load(); }
 
-  /// Holding registers, function 3. @throws LinkError if nothing usable came back; DriverError on an exception code.
+  /// Holding registers, function 3. @throws LinkError if nothing usable came back; DriverError on an
+  /// exception code.
   void read(int unit, int address, std::span<std::uint16_t> words);
   void write(int unit, int address, std::span<const std::uint16_t> words);  ///< function 16
   void write_one(int unit, int address, std::uint16_t word);                ///< function 6

@@ -118,7 +118,8 @@ void OrientalDrive::home(const GiveUp& give_up) {
   pulse_input(kHome);
   for (int i = 0; i < 12000; ++i) {
     const Reading reading = read();
-    if (reading.has_fault) throw DriverError("the axis reports " + alarm_text(reading.alarm) + " while homing");
+    if (reading.has_fault)
+      throw DriverError("the axis reports " + alarm_text(reading.alarm) + " while homing");
     if (reading.has_arrived && i > 4) return;
     if (give_up()) throw DriverError("homing was stopped");
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -10,9 +10,9 @@
 #include "drivers/axes/modbus_bus.h"
 #include "drivers/device_options.h"
 
-/// Oriental Motor AZ drives by "direct data operation": one write of 16 registers carries target, speed, rates and the
-/// trigger that starts the move; or one write carries them with the trigger at 0, and a second, of the trigger alone,
-/// starts it later. 32-bit values have their high word first.
+/// Oriental Motor AZ drives by "direct data operation": one write of 16 registers carries target, speed,
+/// rates and the trigger that starts the move; or one write carries them with the trigger at 0, and a second,
+/// of the trigger alone, starts it later. 32-bit values have their high word first.
 namespace hilbrush {
 
 namespace oriental_az {
@@ -24,7 +24,13 @@ inline constexpr int kDriverOutputAt = 0x007F;  ///< low word of 0x007E
 inline constexpr int kAlarmAt = 0x0080;         ///< 2 words
 inline constexpr int kPositionAt = 0x0120;      ///< 4 words: feedback position, command position
 
-enum Input : std::uint16_t { kStart = 1 << 3, kHome = 1 << 4, kStop = 1 << 5, kFree = 1 << 6, kAlarmReset = 1 << 7 };
+enum Input : std::uint16_t {
+  kStart = 1 << 3,
+  kHome = 1 << 4,
+  kStop = 1 << 5,
+  kFree = 1 << 6,
+  kAlarmReset = 1 << 7
+};
 enum Output : std::uint16_t {
   kReady = 1 << 5,
   kAlarm = 1 << 7,

@@ -14,12 +14,13 @@ namespace {
 
 using line_codec::trimmed;
 
-static_assert(std::endian::native == std::endian::little, "the feedback packet is little-endian and copied as it is");
+static_assert(std::endian::native == std::endian::little,
+              "the feedback packet is little-endian and copied as it is");
 
 // Byte offsets in the feedback packet.
 constexpr std::size_t kLengthAt = 0, kDigitalOutputsAt = 16, kModeAt = 24, kTimeAt = 32, kTestWordAt = 48,
-                      kSetpointAt = 192, kActualAt = 432, kSpeedAt = 480, kEnabledAt = 1026, kRunningAt = 1028,
-                      kErrorAt = 1029;
+                      kSetpointAt = 192, kActualAt = 432, kSpeedAt = 480, kEnabledAt = 1026,
+                      kRunningAt = 1028, kErrorAt = 1029;
 constexpr std::uint64_t kTestWord = 0x0123456789ABCDEF;
 constexpr double kFigureMax = 1e6;  ///< no joint of an arm is ever there
 

@@ -8,9 +8,10 @@
 #include <string_view>
 #include <vector>
 
-/// Messages of the Dobot 4-axis TCP/IP interface as pure functions (manual "TCP_IP Remote Control Interface Guide
-/// (4axis)", 2024-04-19): ASCII commands and replies of the ports 29999 (dashboard, at once) and 30003 (motion,
-/// queued), and the binary feedback packet of port 30004. Units of the wire: degrees, millimeters, milliseconds.
+/// Messages of the Dobot 4-axis TCP/IP interface as pure functions (manual "TCP_IP Remote Control Interface
+/// Guide (4axis)", 2024-04-19): ASCII commands and replies of the ports 29999 (dashboard, at once) and 30003
+/// (motion, queued), and the binary feedback packet of port 30004. Units of the wire: degrees, millimeters,
+/// milliseconds.
 namespace hilbrush::dobot {
 
 /// J1, J2 in degrees, J3 in mm, J4 in degrees.
@@ -20,8 +21,9 @@ using Joints = std::array<double, 4>;
 std::string encode(std::string_view name, std::initializer_list<long> parameters = {});
 /// `JointMovJ(j1,j2,j3,j4)` with six decimals: a billionth of a meter at arm's length.
 std::string encode_joint_move(const Joints& joints);
-/// A pulse on a digital output that the controller times by itself: `DO(i,1)wait(ms)DO(i,0)Sync()`. To be sent in one
-/// write, so that it is queued whole or not at all; Sync is answered when the output is off again.
+/// A pulse on a digital output that the controller times by itself: `DO(i,1)wait(ms)DO(i,0)Sync()`. To be
+/// sent in one write, so that it is queued whole or not at all; Sync is answered when the output is off
+/// again.
 std::array<std::string, 4> encode_pulse(int output, long pulse_ms);
 
 /// `ErrorID,{values},Name(p1,p2);`

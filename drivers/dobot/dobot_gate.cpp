@@ -51,8 +51,8 @@ const char* DobotRobot::OutputGate::fault_in(const dobot::Frame& frame) {
 
 void DobotRobot::OutputGate::pulse(double pulse_s) {
   const long pulse_ms = std::lround(pulse_s * 1e3);
-  if (!(pulse_s > 0) || pulse_s > kGatePulseMaxS || std::abs(pulse_s * 1e3 - static_cast<double>(pulse_ms)) > 1e-3 ||
-      pulse_ms < 1)
+  if (!(pulse_s > 0) || pulse_s > kGatePulseMaxS ||
+      std::abs(pulse_s * 1e3 - static_cast<double>(pulse_ms)) > 1e-3 || pulse_ms < 1)
     throw DriverError("the robot times pulses of whole milliseconds only");
   {
     const std::lock_guard lock(robot_.mutex_);
@@ -81,9 +81,9 @@ void DobotRobot::OutputGate::pulse(double pulse_s) {
   }
 }
 
-/// Turns the output off, empties the queue, and turns the output off again in case the queue turned it on in between.
-/// All in one write, because an emptied queue has lost the end of its pulse. A controller in alarm refuses the reset,
-/// but its queue is empty.
+/// Turns the output off, empties the queue, and turns the output off again in case the queue turned it on in
+/// between. All in one write, because an emptied queue has lost the end of its pulse. A controller in alarm
+/// refuses the reset, but its queue is empty.
 bool DobotRobot::OutputGate::order_off(bool was_pulsing, double wall_s) noexcept {
   try {
     const std::string off = dobot::encode("DOExecute", {output_, 0});
@@ -95,8 +95,8 @@ bool DobotRobot::OutputGate::order_off(bool was_pulsing, double wall_s) noexcept
   }
 }
 
-/// While a pulse may be on, a controller that does not answer at once is not waited for: the listener is called first,
-/// so that the laser head is disarmed. The second try opens a new connection.
+/// While a pulse may be on, a controller that does not answer at once is not waited for: the listener is
+/// called first, so that the laser head is disarmed. The second try opens a new connection.
 bool DobotRobot::OutputGate::off() noexcept {
   try {
     bool was_pulsing = false;

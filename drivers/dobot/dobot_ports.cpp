@@ -87,7 +87,8 @@ std::vector<dobot::Reply> DobotPorts::exchange(const std::vector<std::string>& c
     stream.push({bytes.data(), got});
     while (const auto text = stream.next()) {
       auto reply = dobot::decode_reply(*text);
-      if (!reply || replies.size() == commands.size() || !dobot::is_echo(reply->command, commands[replies.size()]))
+      if (!reply || replies.size() == commands.size() ||
+          !dobot::is_echo(reply->command, commands[replies.size()]))
         fail_with("gives no proper answer");
       replies.push_back(std::move(*reply));
     }
@@ -185,12 +186,13 @@ void DobotPorts::run() {
     for (;;) {
       std::array<pollfd, 3> polled{pollfd{wake_fd_, POLLIN, 0}, pollfd{motion_->descriptor(), POLLIN, 0},
                                    pollfd{feedback_->descriptor(), POLLIN, 0}};
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(feedback_deadline_ - Steady::now()).count();
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(feedback_deadline_ - Steady::now()).count();
       const int ready = ::poll(polled.data(), polled.size(), static_cast<int>(std::max<long long>(left, 0)));
       if (ready < 0 && errno != EINTR) throw LinkError("the robot's ports cannot be polled");
       if (polled[0].revents != 0) return;
-      // All frames that came before an answer are older than it: a reader that was kept waiting must not take one of
-      // them for what followed.
+      // All frames that came before an answer are older than it: a reader that was kept waiting must not take
+      // one of them for what followed.
       if (ready > 0 && polled[2].revents != 0) read_feedback();
       if (ready > 0 && polled[1].revents != 0) read_motion();
       if (Steady::now() >= feedback_deadline_)
@@ -223,7 +225,8 @@ void DobotPorts::read_motion() {
   motion_->messages().received({bytes.data(), got});
   replies_.push({bytes.data(), got});
   while (const auto text = replies_.next()) settle_reply(*text);
-  if (replies_.is_overlong()) throw LinkError("the robot gives an endless answer" + motion_->messages().text());
+  if (replies_.is_overlong())
+    throw LinkError("the robot gives an endless answer" + motion_->messages().text());
 }
 
 /// Answers come in the order of the commands. Those to commands that a stop has swept away may be missing.
@@ -233,7 +236,8 @@ void DobotPorts::settle_reply(const std::string& text) {
   OnReply callback;
   {
     const std::lock_guard lock(mutex_);
-    while (!owed_.empty() && owed_.front().is_forgotten && !dobot::is_echo(reply->command, owed_.front().command))
+    while (!owed_.empty() && owed_.front().is_forgotten &&
+           !dobot::is_echo(reply->command, owed_.front().command))
       owed_.pop_front();
     if (owed_.empty() || !dobot::is_echo(reply->command, owed_.front().command))
       throw LinkError("the robot sent an answer to no command" + motion_->messages().text());

@@ -17,9 +17,9 @@
 
 namespace hilbrush {
 
-/// The three connections of one Dobot controller. The dashboard answers each command at once; motion commands are
-/// queued, each is answered when accepted (Sync when all before it is done); the feedback port sends a frame every 8
-/// ms. One reader thread takes whatever motion and feedback ports say.
+/// The three connections of one Dobot controller. The dashboard answers each command at once; motion commands
+/// are queued, each is answered when accepted (Sync when all before it is done); the feedback port sends a
+/// frame every 8 ms. One reader thread takes whatever motion and feedback ports say.
 class DobotPorts {
  public:
   static constexpr double kReplyS = 1;     ///< wall: an ordinary answer
@@ -39,19 +39,20 @@ class DobotPorts {
   /// Ends the reader and closes all. Not from the reader's thread.
   void close() noexcept;
 
-  /// One command on the dashboard; returns the reply's values. From any thread, one exchange at a time; connects if
-  /// need be. A reply that does not come in time or does not belong to the command closes the connection, so that a
-  /// late one cannot be taken for another's. @throws LinkError; DriverError if the controller refuses.
+  /// One command on the dashboard; returns the reply's values. From any thread, one exchange at a time;
+  /// connects if need be. A reply that does not come in time or does not belong to the command closes the
+  /// connection, so that a late one cannot be taken for another's. @throws LinkError; DriverError if the
+  /// controller refuses.
   std::string dashboard(const std::string& command, double wall_s = kReplyS);
 
-  /// Several commands in one write, so that nothing comes between them; their replies in the same order, refusals
-  /// included. @throws LinkError
+  /// Several commands in one write, so that nothing comes between them; their replies in the same order,
+  /// refusals included. @throws LinkError
   std::vector<dobot::Reply> dashboard_all(const std::vector<std::string>& commands, double wall_s);
 
   /// Called by the reader's thread with the reply, or with nothing if it will never come.
   using OnReply = std::function<void(const dobot::Reply*)>;
-  /// Queues commands in one write and waits until all but `later_count` of them are answered; `on_later` gets the last
-  /// one's answer. One thread. @throws LinkError; DriverError if one is refused.
+  /// Queues commands in one write and waits until all but `later_count` of them are answered; `on_later` gets
+  /// the last one's answer. One thread. @throws LinkError; DriverError if one is refused.
   void motion(const std::string* commands, std::size_t count, std::size_t later_count = 0,
               const OnReply& on_later = {});
   /// The queue was cleared: answers that are still owed may never come.

@@ -12,12 +12,13 @@ namespace hilbrush {
 namespace {
 
 constexpr double kFrameS = 0.008;
-constexpr double kSilentFrames = 30;      ///< this many missing in a row: the feedback has stopped
-constexpr double kSilenceMinS = 0.25;     ///< wall: a busy machine may keep the reader waiting
-constexpr double kEnableS = 20;           ///< cell
-constexpr double kSetpointWindow = 2e-5;  ///< deg, mm: what six decimals and the controller's arithmetic may differ
-constexpr double kRestSpeed = 0.5;        ///< deg/s, mm/s
-constexpr double kStampMs = 1;            ///< resolution of the frames' time stamps
+constexpr double kSilentFrames = 30;   ///< this many missing in a row: the feedback has stopped
+constexpr double kSilenceMinS = 0.25;  ///< wall: a busy machine may keep the reader waiting
+constexpr double kEnableS = 20;        ///< cell
+constexpr double kSetpointWindow =
+    2e-5;                           ///< deg, mm: what six decimals and the controller's arithmetic may differ
+constexpr double kRestSpeed = 0.5;  ///< deg/s, mm/s
+constexpr double kStampMs = 1;      ///< resolution of the frames' time stamps
 constexpr std::size_t kJ3Index = 2;
 
 double window_of(const DobotOptions& options, std::size_t joint) {
@@ -72,8 +73,8 @@ void DobotRobot::fail(const std::string& sentence) {
   clock_.wake();
 }
 
-/// After a fault it is not known whether the controller still carries out what was queued, such as the end of a pulse.
-/// The dashboard may still answer.
+/// After a fault it is not known whether the controller still carries out what was queued, such as the end of
+/// a pulse. The dashboard may still answer.
 void DobotRobot::close_gates() noexcept {
   std::vector<OutputGate*> gates;
   {
@@ -139,7 +140,8 @@ void DobotRobot::enable() {
   group_.require(DeviceState::kConnected, "enabled");
   ports_.dashboard(dobot::encode("EnableRobot"), DobotPorts::kReplyS * 5);
   wait_for_mode(dobot::Mode::kEnabled, kEnableS, "enabled");
-  ports_.dashboard(dobot::encode("ResetRobot"));  // a queue left behind by another program must not start to move
+  ports_.dashboard(
+      dobot::encode("ResetRobot"));  // a queue left behind by another program must not start to move
   ports_.dashboard(dobot::encode("SpeedFactor", {options_.speed_percent}));
   ports_.dashboard(dobot::encode("User", {0}));
   ports_.dashboard(dobot::encode("Tool", {0}));
@@ -233,8 +235,10 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
     if (!group_.is_under_way()) queued_ = 0;
     if (queued_ > kLookAhead) throw DriverError("the robot refuses to move: too many targets are ahead");
     ++queued_;
-    const double start_s = std::max(clock_.now_s(), group_.is_under_way() ? group_.arrival_s - group_.settle_s : 0);
-    group_.arrival_s = start_s + travel_s(group_.is_target_current ? target_ : frame_.actual, joints) + settle_s;
+    const double start_s =
+        std::max(clock_.now_s(), group_.is_under_way() ? group_.arrival_s - group_.settle_s : 0);
+    group_.arrival_s =
+        start_s + travel_s(group_.is_target_current ? target_ : frame_.actual, joints) + settle_s;
     target_ = joints;
     group_.settle_s = settle_s;
     group_.is_target_current = true;
@@ -258,14 +262,16 @@ void DobotRobot::move_to(const Positions& target, double settle_s) {
 
 /// By what the controller reports: its profile has ended at the target, no axis moves, nothing is queued.
 bool DobotRobot::is_at_rest(const dobot::Frame& frame) const {
-  // While the queue times a pulse the controller reports "running" although the arm, already in position, does not
-  // move. Before that, "running" counts as motion: a frame may show the very beginning of a move, still at speed 0.
+  // While the queue times a pulse the controller reports "running" although the arm, already in position,
+  // does not move. Before that, "running" counts as motion: a frame may show the very beginning of a move,
+  // still at speed 0.
   const bool is_pulsing_in_place =
       group_.is_in_position &&
       std::any_of(gates_.begin(), gates_.end(), [](const auto& gate) { return gate.second->is_busy(); });
   if (!is_pulsing_in_place && (frame.mode != dobot::Mode::kEnabled || frame.is_running)) return false;
   for (std::size_t i = 0; i < target_.size(); ++i)
-    if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) || !(std::abs(frame.speed[i]) <= kRestSpeed))
+    if (!(std::abs(frame.setpoint[i] - target_[i]) <= kSetpointWindow) ||
+        !(std::abs(frame.speed[i]) <= kRestSpeed))
       return false;
   return true;
 }
@@ -276,8 +282,9 @@ bool DobotRobot::is_within_window(const dobot::Frame& frame) const {
   return true;
 }
 
-/// Under the lock. True if in_position changed. Settling is counted from the first frame that shows rest, although the
-/// profile ended up to a frame earlier: what happened between two frames is not known, and a pulse must not be early.
+/// Under the lock. True if in_position changed. Settling is counted from the first frame that shows rest,
+/// although the profile ended up to a frame earlier: what happened between two frames is not known, and a
+/// pulse must not be early.
 bool DobotRobot::judge_arrival(const dobot::Frame& frame) {
   const bool was_in_position = group_.is_in_position;
   if (!group_.is_target_current || frame.time_ms <= accepted_ms_ || !is_at_rest(frame)) {

@@ -15,12 +15,13 @@
 
 namespace hilbrush {
 
-/// A Dobot 4-axis robot (M1 Pro, MG400) over TCP. "Accepted" is not "executed": a move is over when feedback frames
-/// show the controller's set-point at the target, the joints within a window of it and at rest, and the controller
-/// idle, for the settle time by the controller's own clock. Frames that repeat a time stamp count as silence.
+/// A Dobot 4-axis robot (M1 Pro, MG400) over TCP. "Accepted" is not "executed": a move is over when feedback
+/// frames show the controller's set-point at the target, the joints within a window of it and at rest, and
+/// the controller idle, for the settle time by the controller's own clock. Frames that repeat a time stamp
+/// count as silence.
 ///
-/// Threads: the executor's (all that moves), one reader for motion and feedback ports, any for stop(), status() and the
-/// gates' off(). The encoders are absolute: home() moves nothing.
+/// Threads: the executor's (all that moves), one reader for motion and feedback ports, any for stop(),
+/// status() and the gates' off(). The encoders are absolute: home() moves nothing.
 class DobotRobot final : public Robot {
  public:
   /// `clock` outlives it; it is woken when status() or a gate changes.
@@ -39,11 +40,12 @@ class DobotRobot final : public Robot {
   double expected_arrival_s() override;
   void stop() noexcept override;
 
-  /// The gate on digital output `output` (1...). Pulses are whole milliseconds, queued as on - wait - off; off() is
-  /// immediate and clears the queue if a pulse may be in it. Owned by the robot.
+  /// The gate on digital output `output` (1...). Pulses are whole milliseconds, queued as on - wait - off;
+  /// off() is immediate and clears the queue if a pulse may be in it. Owned by the robot.
   Gate& gate(int output);
 
-  /// What the controller reports about itself, a line each, for the operator. Connected or more. @throws DriverError
+  /// What the controller reports about itself, a line each, for the operator. Connected or more. @throws
+  /// DriverError
   std::vector<std::string> identify();
 
  private:
@@ -75,7 +77,7 @@ class DobotRobot final : public Robot {
   dobot::Joints target_{};
   std::size_t queued_ = 0;         ///< targets since it was in position, or stopped
   std::uint64_t accepted_ms_ = 0;  ///< controller's time of the last frame before the target was accepted
-  double rest_ms_ = -1;            ///< controller's time since when it rests at the target; negative: it does not
+  double rest_ms_ = -1;  ///< controller's time since when it rests at the target; negative: it does not
   std::map<int, std::unique_ptr<OutputGate>> gates_;
 
   DobotPorts ports_;  ///< last: its reader uses all of the above

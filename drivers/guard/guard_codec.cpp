@@ -83,8 +83,9 @@ std::optional<Reply> decode_reply(std::string_view message) {
 
 std::string encode(const StatusMessage& message) {
   const std::string text = "status " + std::to_string(static_cast<int>(message.status.state)) +
-                           (message.status.interlock_closed ? " 1" : " 0") + (message.is_gate_on ? " 1 " : " 0 ") +
-                           std::to_string(message.read_ns) + ' ' + std::to_string(message.requested_readings) + ' ';
+                           (message.status.interlock_closed ? " 1" : " 0") +
+                           (message.is_gate_on ? " 1 " : " 0 ") + std::to_string(message.read_ns) + ' ' +
+                           std::to_string(message.requested_readings) + ' ';
   return (text + message.status.fault).substr(0, kMessageMax);
 }
 
@@ -98,7 +99,8 @@ std::optional<StatusMessage> decode_status(std::string_view message) {
       !read(take_word(message), is_gate_on) || !read(take_word(message), result.read_ns) ||
       !read(take_word(message), result.requested_readings))
     return std::nullopt;
-  if (state < 0 || state > static_cast<int>(DeviceState::kFault) || (is_closed & ~1) != 0 || (is_gate_on & ~1) != 0)
+  if (state < 0 || state > static_cast<int>(DeviceState::kFault) || (is_closed & ~1) != 0 ||
+      (is_gate_on & ~1) != 0)
     return std::nullopt;
   result.status.state = static_cast<DeviceState>(state);
   result.status.interlock_closed = is_closed == 1;

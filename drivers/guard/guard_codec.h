@@ -6,15 +6,15 @@
 
 #include "drivers/laser_head.h"
 
-/// What a laser's user and its guard say to each other over a socketpair that keeps messages apart (SOCK_SEQPACKET).
-/// Text, so that a trace can be read: `17 power 0.0123`, `17 ok`, `17 error SENTENCE`, `beat`, `status ...`. Pure
-/// functions; anything else decodes to nothing.
+/// What a laser's user and its guard say to each other over a socketpair that keeps messages apart
+/// (SOCK_SEQPACKET). Text, so that a trace can be read: `17 power 0.0123`, `17 ok`, `17 error SENTENCE`,
+/// `beat`, `status ...`. Pure functions; anything else decodes to nothing.
 namespace hilbrush::guard {
 
 inline constexpr std::size_t kMessageMax = 4096;
 
-/// kLight: a gate that is not the laser's own opens, and will be reported closed by kDark within `value` seconds. These
-/// two and kRequestStatus get no reply.
+/// kLight: a gate that is not the laser's own opens, and will be reported closed by kDark within `value`
+/// seconds. These two and kRequestStatus get no reply.
 enum class Verb {
   kConnect,
   kIdentify,

@@ -43,7 +43,8 @@ int GuardProcess::start(const std::string& program, const std::vector<std::strin
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
-  // dup2 onto itself would leave close-on-exec set, so the guard's end goes through a number that is not kChannel.
+  // dup2 onto itself would leave close-on-exec set, so the guard's end goes through a number that is not
+  // kChannel.
   const int theirs = ::fcntl(pair[1], F_DUPFD_CLOEXEC, kChannel + 1);
   posix_spawn_file_actions_t actions;
   ::posix_spawn_file_actions_init(&actions);

@@ -6,9 +6,9 @@
 
 namespace hilbrush {
 
-/// A hilbrush-laserguard process and this side's end of its channel. When the channel is closed the guard disarms the
-/// laser and ends by itself; the destructor waits for that, for a bounded time, and leaves a guard that is still busy
-/// disarming alone.
+/// A hilbrush-laserguard process and this side's end of its channel. When the channel is closed the guard
+/// disarms the laser and ends by itself; the destructor waits for that, for a bounded time, and leaves a
+/// guard that is still busy disarming alone.
 class GuardProcess {
  public:
   GuardProcess() = default;
@@ -16,7 +16,8 @@ class GuardProcess {
   GuardProcess(const GuardProcess&) = delete;
   GuardProcess& operator=(const GuardProcess&) = delete;
 
-  /// Starts `program`; its channel is its descriptor kChannel, all others but standard error are closed to it.
+  /// Starts `program`; its channel is its descriptor kChannel, all others but standard error are closed to
+  /// it.
   /// @return this side's end, owned by the caller. @throws DriverError
   int start(const std::string& program, const std::vector<std::string>& arguments);
   int pid() const { return pid_; }

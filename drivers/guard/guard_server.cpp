@@ -24,7 +24,8 @@ constexpr double kLightMaxS = 120;   ///< longer than any pulse
 
 }  // namespace
 
-GuardServer::GuardServer(LaserHead& head, Gate* gate, int channel, int signals, const Options& options, Clock& clock)
+GuardServer::GuardServer(LaserHead& head, Gate* gate, int channel, int signals, const Options& options,
+                         Clock& clock)
     : head_(head), gate_(gate), channel_(channel), signals_(signals), options_(options), clock_(clock) {
   head_.set_listener([this] {
     {
@@ -54,17 +55,19 @@ GuardServer::~GuardServer() {
   if (gate_ != nullptr) gate_->set_listener({});
 }
 
-/// A user that takes no messages is not waited for: the channel's buffer is bounded, and its silence ends in a missed
-/// heartbeat anyway.
+/// A user that takes no messages is not waited for: the channel's buffer is bounded, and its silence ends in
+/// a missed heartbeat anyway.
 void GuardServer::send(const std::string& message) {
-  [[maybe_unused]] const ssize_t sent = ::send(channel_, message.data(), message.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  [[maybe_unused]] const ssize_t sent =
+      ::send(channel_, message.data(), message.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
 void GuardServer::send_status() {
   guard::StatusMessage message;
   message.status = head_.status();
   const double age_s = clock_.wall_s(clock_.now_s() - message.status.read_s);
-  const auto read = Steady::now() - std::chrono::duration_cast<Steady::duration>(std::chrono::duration<double>(age_s));
+  const auto read =
+      Steady::now() - std::chrono::duration_cast<Steady::duration>(std::chrono::duration<double>(age_s));
   message.read_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(read.time_since_epoch()).count();
   message.is_gate_on = gate_ != nullptr && gate_->is_on();
   {
@@ -116,8 +119,8 @@ GuardServer::End GuardServer::run() {
     if (end) break;
     if (has_beaten_ && Steady::now() >= beat_deadline) {
       has_beaten_ = false;  // watched again after the next heartbeat
-      trip("the laser's guard heard nothing of its user for " + std::to_string(std::lround(allowance_s * 1e3)) +
-           " ms and turned the laser off");
+      trip("the laser's guard heard nothing of its user for " +
+           std::to_string(std::lround(allowance_s * 1e3)) + " ms and turned the laser off");
     }
     if (dark_deadline_ && Steady::now() >= *dark_deadline_) {
       dark_deadline_.reset();

@@ -15,11 +15,11 @@
 
 namespace hilbrush {
 
-/// The guard's side of the channel: obeys requests, and disarms the laser by itself when heartbeats are missing, when
-/// the channel ends, when it carries an invalid message, when the end of a pulse that was announced is not reported in
-/// time, or when a signal asks the guard to end. A missing heartbeat, and a missing end, latch until the user clears
-/// them. Requests that wait for the laser run on a thread of their own, so that heartbeats are always heard; disarming
-/// and closing the gate do not wait for them.
+/// The guard's side of the channel: obeys requests, and disarms the laser by itself when heartbeats are
+/// missing, when the channel ends, when it carries an invalid message, when the end of a pulse that was
+/// announced is not reported in time, or when a signal asks the guard to end. A missing heartbeat, and a
+/// missing end, latch until the user clears them. Requests that wait for the laser run on a thread of their
+/// own, so that heartbeats are always heard; disarming and closing the gate do not wait for them.
 class GuardServer {
  public:
   enum class End { kChannelEnded, kGarbage, kSignal };
@@ -28,13 +28,13 @@ class GuardServer {
     int heartbeats_missed = 5;
   };
 
-  /// `channel`: the guard's end of a SOCK_SEQPACKET pair. `signals`: a descriptor that becomes readable when the guard
-  /// shall end, or -1. `gate` is null if the gate is not the laser's own. All outlive it.
+  /// `channel`: the guard's end of a SOCK_SEQPACKET pair. `signals`: a descriptor that becomes readable when
+  /// the guard shall end, or -1. `gate` is null if the gate is not the laser's own. All outlive it.
   GuardServer(LaserHead& head, Gate* gate, int channel, int signals, const Options& options, Clock& clock);
   ~GuardServer();
 
-  /// Serves until the end of the channel or a signal. The laser is disarmed when it returns; is_disarmed() says
-  /// whether it confirmed that.
+  /// Serves until the end of the channel or a signal. The laser is disarmed when it returns; is_disarmed()
+  /// says whether it confirmed that.
   End run();
   bool is_disarmed() const { return is_disarmed_; }
 

@@ -68,7 +68,10 @@ class GuardedHead::RemoteGate final : public Gate {
 };
 
 GuardedHead::GuardedHead(Launch launch, const Options& options, Clock& clock)
-    : launch_(std::move(launch)), options_(options), clock_(clock), gate_(std::make_unique<RemoteGate>(*this)) {}
+    : launch_(std::move(launch)),
+      options_(options),
+      clock_(clock),
+      gate_(std::make_unique<RemoteGate>(*this)) {}
 
 GuardedHead::~GuardedHead() {
   close_channel();
@@ -209,7 +212,8 @@ std::string GuardedHead::request(guard::Verb verb, double value, double wall_s) 
     replies_.erase(number);
     throw;
   }
-  replied_.wait_until(lock, deadline_in(wall_s), [&] { return replies_[number] != nullptr || !lost_.empty(); });
+  replied_.wait_until(lock, deadline_in(wall_s),
+                      [&] { return replies_[number] != nullptr || !lost_.empty(); });
   const std::unique_ptr<guard::Reply> reply = std::move(replies_[number]);
   replies_.erase(number);
   if (!reply) throw LinkError(lost_.empty() ? "the laser's guard does not answer" : lost_);

@@ -15,8 +15,9 @@
 
 namespace hilbrush {
 
-/// A laser's head in another process: its guard (guard_server.h). Sends heartbeats from a thread of its own for as
-/// long as it lives; the guard turns the laser off without them. A guard that ends or falls silent is a fault.
+/// A laser's head in another process: its guard (guard_server.h). Sends heartbeats from a thread of its own
+/// for as long as it lives; the guard turns the laser off without them. A guard that ends or falls silent is
+/// a fault.
 class GuardedHead final : public LaserHead {
  public:
   struct Options {

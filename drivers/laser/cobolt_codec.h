@@ -2,8 +2,8 @@
 #include <string>
 #include <string_view>
 
-/// Messages of Hübner (Cobolt) 06 lasers as pure functions: ASCII lines that end with CR, 115200 baud; each is answered
-/// by one line, except those that begin with '!': command modulation, for fast dots.
+/// Messages of Hübner (Cobolt) 06 lasers as pure functions: ASCII lines that end with CR, 115200 baud; each
+/// is answered by one line, except those that begin with '!': command modulation, for fast dots.
 namespace hilbrush::cobolt {
 
 std::string encode(std::string_view command);  ///< with its line end

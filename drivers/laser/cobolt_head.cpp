@@ -19,7 +19,8 @@ constexpr unsigned long kTimerSlackNs = 1000;
 }  // namespace
 
 /// One line for each command; a refusal is a line that begins with "Syntax error" or "Error".
-std::string CoboltHead::exchange(Link& link, LineReader& lines, const std::string& command, Deadline deadline) {
+std::string CoboltHead::exchange(Link& link, LineReader& lines, const std::string& command,
+                                 Deadline deadline) {
   link.write(cobolt::encode(command), deadline);
   std::string line = lines.read_line(link, deadline);
   if (line.starts_with("Syntax error") || line.starts_with("Error") || line.starts_with("error"))
@@ -52,7 +53,8 @@ LaserHead::Powers CoboltHead::read_powers() {
   return {0, ask_number("glp?") * 1e-3};
 }
 
-/// The mode alone shows that there is no fault; only otherwise is the fault read, because of the gap between commands.
+/// The mode alone shows that there is no fault; only otherwise is the fault read, because of the gap between
+/// commands.
 LineLaser::Condition CoboltHead::read_condition() {
   const auto mode = static_cast<cobolt::Mode>(ask_integer("gom?"));
   Condition condition;
@@ -110,7 +112,8 @@ std::vector<std::string> CoboltHead::read_names() {
   return {"model " + ask("glm?") + ", serial number " + ask("gsn?") + ", firmware " + ask("gfv?")};
 }
 
-CoboltGate::CoboltGate(CoboltHead& head, Clock& clock) : head_(head), clock_(clock), thread_([this] { run(); }) {}
+CoboltGate::CoboltGate(CoboltHead& head, Clock& clock)
+    : head_(head), clock_(clock), thread_([this] { run(); }) {}
 
 CoboltGate::~CoboltGate() {
   {

@@ -12,8 +12,9 @@
 
 namespace hilbrush {
 
-/// A Hübner (Cobolt) 06 laser in modulation mode. Gated by its own fast commands (!e, !d: command modulation) or by a
-/// digital line, as `is_gated_by_line` says. Ordinary commands keep a distance of LaserOptions::command_gap_s.
+/// A Hübner (Cobolt) 06 laser in modulation mode. Gated by its own fast commands (!e, !d: command modulation)
+/// or by a digital line, as `is_gated_by_line` says. Ordinary commands keep a distance of
+/// LaserOptions::command_gap_s.
 class CoboltHead final : public LineLaser {
  public:
   CoboltHead(const LaserOptions& options, bool is_gated_by_line, Clock& clock)
@@ -42,9 +43,9 @@ class CoboltHead final : public LineLaser {
   const bool is_gated_by_line_;
 };
 
-/// The serial gate: a thread of its own ends each pulse. Nothing else bounds it, so it belongs in a process that
-/// survives its user: see guard_server.h. The laser does not answer !d, so off() sends a query afterwards: a
-/// laser that answers it has carried out !d.
+/// The serial gate: a thread of its own ends each pulse. Nothing else bounds it, so it belongs in a process
+/// that survives its user: see guard_server.h. The laser does not answer !d, so off() sends a query
+/// afterwards: a laser that answers it has carried out !d.
 class CoboltGate final : public Gate {
  public:
   CoboltGate(CoboltHead& head, Clock& clock);

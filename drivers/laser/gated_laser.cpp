@@ -44,7 +44,8 @@ GatedLaser::~GatedLaser() {
 }
 
 void GatedLaser::connect() {
-  if (!gate_.off()) throw DriverError("the laser cannot be connected: its gate does not confirm that it is off");
+  if (!gate_.off())
+    throw DriverError("the laser cannot be connected: its gate does not confirm that it is off");
   head_->connect();
 }
 
@@ -58,7 +59,8 @@ void GatedLaser::check_powers() {
 }
 
 void GatedLaser::enable() {
-  if (!gate_.off()) throw DriverError("the laser cannot be enabled: its gate does not confirm that it is off");
+  if (!gate_.off())
+    throw DriverError("the laser cannot be enabled: its gate does not confirm that it is off");
   check_powers();
   head_->arm();
   may_fire_ = true;
@@ -82,8 +84,9 @@ void GatedLaser::check_ready() {
 GatedLaser::Timed GatedLaser::timed(double power_w, double pulse_s) const {
   if (!is_within(power_w, limits_.power_min_w, limits_.power_max_w) ||
       !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s))
-    throw DriverError("the laser refuses a pulse of " + milli_text(power_w) + " mW and " + milli_text(pulse_s) +
-                      " ms: its limits are " + range_text(limits_.power_min_w, limits_.power_max_w) + " mW and " +
+    throw DriverError("the laser refuses a pulse of " + milli_text(power_w) + " mW and " +
+                      milli_text(pulse_s) + " ms: its limits are " +
+                      range_text(limits_.power_min_w, limits_.power_max_w) + " mW and " +
                       range_text(limits_.pulse_min_s, limits_.pulse_max_s) + " ms");
   const double step_s = gate_.resolution_s();
   const double timed_s = step_s > 0 ? std::max(1., std::ceil(pulse_s / step_s - 1e-3)) * step_s : pulse_s;
@@ -152,7 +155,9 @@ Laser::Status GatedLaser::status() {
     const std::lock_guard lock(mutex_);
     if (is_reading_due_ && head.state == DeviceState::kReady) status.is_emitting = true;
     // The gate's word comes first, the laser's own account of the pulse after it.
-    status.dark_since_s = !status.is_emitting ? dark_since_s_ : is_reading_due_ ? std::max(0., gate_dark_s_) : 0;
+    status.dark_since_s = !status.is_emitting ? dark_since_s_
+                          : is_reading_due_   ? std::max(0., gate_dark_s_)
+                                              : 0;
   }
   status.state = status.is_emitting && head.state == DeviceState::kReady ? DeviceState::kMoving : head.state;
   status.interlock_closed = head.interlock_closed;
@@ -162,7 +167,8 @@ Laser::Status GatedLaser::status() {
 
 void GatedLaser::clear_fault() {
   may_fire_ = false;
-  if (!gate_.off()) throw DriverError("the laser's fault cannot be cleared: its gate does not confirm that it is off");
+  if (!gate_.off())
+    throw DriverError("the laser's fault cannot be cleared: its gate does not confirm that it is off");
   head_->clear_fault();
 }
 

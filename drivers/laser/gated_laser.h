@@ -11,9 +11,9 @@
 
 namespace hilbrush {
 
-/// A laser made of its two halves: a head that enables it and sets its power, and a gate that opens the beam. A pulse
-/// counts as over when the gate is confirmed off and the head's status was read after that, so that an interlock that
-/// cut it is seen before the pulse is believed.
+/// A laser made of its two halves: a head that enables it and sets its power, and a gate that opens the beam.
+/// A pulse counts as over when the gate is confirmed off and the head's status was read after that, so that
+/// an interlock that cut it is seen before the pulse is believed.
 class GatedLaser final : public Laser {
  public:
   /// `limits` are the cell file's; the device's own limits are checked when it is enabled. `gate` and `clock`

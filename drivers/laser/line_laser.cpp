@@ -110,7 +110,8 @@ LaserHead::Powers LineLaser::powers() {
 void LineLaser::check_may_arm(const Condition& condition) {
   if (!condition.is_key_in) throw DriverError("the laser cannot be enabled: its key is out");
   if (!condition.is_interlock_closed) throw DriverError("the laser cannot be enabled: its interlock is open");
-  if (!condition.fault.empty()) throw DriverError("the laser cannot be enabled: it reports " + condition.fault);
+  if (!condition.fault.empty())
+    throw DriverError("the laser cannot be enabled: it reports " + condition.fault);
 }
 
 void LineLaser::check_not_disarmed() {
@@ -211,7 +212,8 @@ void LineLaser::set_power(double power_w) {
 
 LaserHead::Status LineLaser::status() {
   const std::lock_guard lock(mutex_);
-  const bool is_closed = state_ != DeviceState::kDisconnected && condition_.is_interlock_closed && condition_.is_key_in;
+  const bool is_closed =
+      state_ != DeviceState::kDisconnected && condition_.is_interlock_closed && condition_.is_key_in;
   return {state_, is_closed, fault_, read_s_};
 }
 
@@ -260,7 +262,8 @@ void LineLaser::set_fault(const std::string& sentence) {
   if (on_change_) on_change_();
 }
 
-/// An interlock or key that opens while armed is latched as a fault: closing it again must not bring the beam back.
+/// An interlock or key that opens while armed is latched as a fault: closing it again must not bring the beam
+/// back.
 void LineLaser::take(const Condition& condition, double begun_s) {
   std::string sentence;
   {

@@ -16,9 +16,9 @@
 
 namespace hilbrush {
 
-/// What lasers with a line protocol have in common: one exchange at a time with a deadline, the life cycle of a head,
-/// and a thread that reads the laser's condition ten times a second and on request. The next exchange opens a link
-/// that failed again, because it is not known which command the answers still on it belong to.
+/// What lasers with a line protocol have in common: one exchange at a time with a deadline, the life cycle of
+/// a head, and a thread that reads the laser's condition ten times a second and on request. The next exchange
+/// opens a link that failed again, because it is not known which command the answers still on it belong to.
 class LineLaser : public LaserHead {
  public:
   void connect() override;
@@ -52,7 +52,8 @@ class LineLaser : public LaserHead {
 
   // What differs between lasers. All but the first are called with no lock held and use ask().
   /// One exchange on the open link. @throws LinkError; DriverError if the laser refuses.
-  virtual std::string exchange(Link& link, LineReader& lines, const std::string& command, Deadline deadline) = 0;
+  virtual std::string exchange(Link& link, LineReader& lines, const std::string& command,
+                               Deadline deadline) = 0;
   virtual void set_up() = 0;                          ///< a quiet, known state; emission off
   virtual std::vector<std::string> read_names() = 0;  ///< model, serial number: lines for the operator
   virtual Powers read_powers() = 0;
@@ -67,7 +68,8 @@ class LineLaser : public LaserHead {
 
   std::string ask(const std::string& command, double wall_s = kReplyS);
   double ask_number(const std::string& query);
-  /// Sends bytes that are not answered, at once, even while an exchange waits for its answer. @throws LinkError
+  /// Sends bytes that are not answered, at once, even while an exchange waits for its answer. @throws
+  /// LinkError
   void say(std::string_view bytes, double wall_s);
   Clock& clock() { return clock_; }
 

@@ -21,7 +21,8 @@ std::string power_command(double power_w) {
 LineKind classify(std::string_view line) {
   line = trimmed(line);
   if (equals_ignoring_case(line, "OK")) return LineKind::kOk;
-  return line.size() >= 3 && equals_ignoring_case(line.substr(0, 3), "ERR") ? LineKind::kError : LineKind::kValue;
+  return line.size() >= 3 && equals_ignoring_case(line.substr(0, 3), "ERR") ? LineKind::kError
+                                                                            : LineKind::kValue;
 }
 
 std::optional<bool> decode_switch(std::string_view line) {

@@ -5,8 +5,9 @@
 #include <string_view>
 #include <vector>
 
-/// Messages of Coherent OBIS lasers (SCPI over a serial line) as pure functions. Commands end with CR LF. With
-/// handshake on, every command is answered by OK or ERR..., every query by a value and then OK or ERR....
+/// Messages of Coherent OBIS lasers (SCPI over a serial line) as pure functions. Commands end with CR LF.
+/// With handshake on, every command is answered by OK or ERR..., every query by a value and then OK or
+/// ERR....
 namespace hilbrush::obis {
 
 std::string encode(std::string_view command);  ///< with its line end

@@ -28,7 +28,8 @@ void ObisHead::set_switch(const std::string& name, bool is_on) {
   ask(name + (is_on ? " ON" : " OFF"));
   const std::string line = ask(name + "?");
   if (obis::decode_switch(line) != is_on)
-    throw DriverError("the laser does not keep " + name + (is_on ? " ON" : " OFF") + ": it says \"" + line + "\"");
+    throw DriverError("the laser does not keep " + name + (is_on ? " ON" : " OFF") + ": it says \"" + line +
+                      "\"");
 }
 
 /// The first command may meet a laser whose handshake is off and that answers nothing, or an exchange that

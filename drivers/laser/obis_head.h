@@ -6,8 +6,9 @@
 
 namespace hilbrush {
 
-/// A Coherent OBIS laser in external digital modulation: emission is armed once per job, a digital line gates it.
-/// Handshake on, prompt off, CDRH delay on, autostart off; all read back. Nothing of it is fast enough to gate by.
+/// A Coherent OBIS laser in external digital modulation: emission is armed once per job, a digital line gates
+/// it. Handshake on, prompt off, CDRH delay on, autostart off; all read back. Nothing of it is fast enough to
+/// gate by.
 class ObisHead final : public LineLaser {
  public:
   ObisHead(const LaserOptions& options, Clock& clock) : LineLaser(options, 0, clock) {}

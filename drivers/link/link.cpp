@@ -26,7 +26,8 @@ ssize_t write_quietly(int fd, std::string_view bytes) {
 }  // namespace
 
 Deadline deadline_in(double wall_s) {
-  return Steady::now() + std::chrono::ceil<Steady::duration>(std::chrono::duration<double>(std::min(wall_s, 3600.)));
+  return Steady::now() +
+         std::chrono::ceil<Steady::duration>(std::chrono::duration<double>(std::min(wall_s, 3600.)));
 }
 
 int milliseconds_until(Deadline deadline) {

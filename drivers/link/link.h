@@ -13,7 +13,8 @@
 /// hang-up is distinguished from silence.
 namespace hilbrush {
 
-/// The connection is lost, or it is not known which command an answer belongs to: the link must be opened again.
+/// The connection is lost, or it is not known which command an answer belongs to: the link must be opened
+/// again.
 struct LinkError : DriverError {
   using DriverError::DriverError;
 };
@@ -58,8 +59,8 @@ class Link {
   MessageRing messages_;
 };
 
-/// @throws LinkError "HOST:PORT: ..." if no connection is accepted by the deadline. Small messages are sent at once (no
-/// Nagle).
+/// @throws LinkError "HOST:PORT: ..." if no connection is accepted by the deadline. Small messages are sent
+/// at once (no Nagle).
 std::unique_ptr<Link> open_tcp_link(const std::string& host, std::uint16_t port, Deadline deadline);
 
 enum class Parity { kNone, kEven, kOdd };
@@ -75,8 +76,8 @@ class LineReader {
  public:
   static constexpr std::size_t kLineMax = 256;
 
-  /// The next line without its end. @throws LinkError if none is whole by the deadline ("silence"), if it is longer
-  /// than kLineMax, or if the link is lost.
+  /// The next line without its end. @throws LinkError if none is whole by the deadline ("silence"), if it is
+  /// longer than kLineMax, or if the link is lost.
   std::string read_line(Link& link, Deadline deadline);
   void clear() { buffer_.clear(); }
 

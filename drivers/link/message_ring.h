@@ -8,8 +8,8 @@
 
 namespace hilbrush {
 
-/// The last messages of one link, for the sentence of an error: what was said just before it went wrong. Bounded: keeps
-/// kMessages of at most kTextMax bytes. Any thread.
+/// The last messages of one link, for the sentence of an error: what was said just before it went wrong.
+/// Bounded: keeps kMessages of at most kTextMax bytes. Any thread.
 class MessageRing {
  public:
   static constexpr std::size_t kMessages = 16;
@@ -17,8 +17,8 @@ class MessageRing {
 
   void sent(std::string_view message) { add(true, message); }
   void received(std::string_view message) { add(false, message); }
-  /// ` (last messages: sent "RobotMode()" 12.1 ms ago; received "0,{5},RobotMode();" 11.8 ms ago)`, oldest first, at
-  /// most `count`; empty if there were none. Bytes that do not print are shown as \xNN.
+  /// ` (last messages: sent "RobotMode()" 12.1 ms ago; received "0,{5},RobotMode();" 11.8 ms ago)`, oldest
+  /// first, at most `count`; empty if there were none. Bytes that do not print are shown as \xNN.
   std::string text(std::size_t count = 4) const;
 
  private:

@@ -42,8 +42,8 @@ sp_parity to_library(Parity parity) {
 
 }  // namespace
 
-/// Reading and writing go through the port's descriptor and poll(), because the library does not distinguish a
-/// hang-up from silence, neither when reading (0 bytes) nor when waiting.
+/// Reading and writing go through the port's descriptor and poll(), because the library does not distinguish
+/// a hang-up from silence, neither when reading (0 bytes) nor when waiting.
 std::unique_ptr<Link> open_serial_link(const std::string& name, int baud, Parity parity) {
   const auto check = [&](sp_return result, const char* what) {
     if (result == SP_OK) return;

@@ -35,7 +35,8 @@ int connect_by(int fd, const addrinfo& address, Deadline deadline) {
   if (errno != EINPROGRESS) return errno;
   for (;;) {
     pollfd polled{fd, POLLOUT, 0};
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now()).count();
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now()).count();
     const int ready = ::poll(&polled, 1, static_cast<int>(std::clamp<long long>(left, 0, 3'600'000)));
     if (ready < 0 && errno == EINTR) continue;
     if (ready <= 0) return ready == 0 ? ETIMEDOUT : errno;
@@ -46,9 +47,12 @@ int connect_by(int fd, const addrinfo& address, Deadline deadline) {
   }
 }
 
-/// A peer that vanished without a word (power cut, cable) is noticed within seconds even on a link that only listens.
+/// A peer that vanished without a word (power cut, cable) is noticed within seconds even on a link that only
+/// listens.
 void set_options(int fd) {
-  const auto set = [fd](int level, int option, int value) { ::setsockopt(fd, level, option, &value, sizeof value); };
+  const auto set = [fd](int level, int option, int value) {
+    ::setsockopt(fd, level, option, &value, sizeof value);
+  };
   set(IPPROTO_TCP, TCP_NODELAY, 1);
   set(SOL_SOCKET, SO_KEEPALIVE, 1);
   set(IPPROTO_TCP, TCP_KEEPIDLE, 2);

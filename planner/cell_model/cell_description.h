@@ -8,13 +8,13 @@
 
 /// The robot cell as data, read from config/cells/*.json. SI units.
 ///
-/// Frames: W world = B robot base, +z up, J1's axis at the origin, the table on +x. F flange. T tool: origin at the
-/// focus, +z along the beam. R table; O object: on the fixture's post, +z along the C axis, z = 0 at the post's top.
-/// Arm (SCARA): J1, J2 revolute about z, J3 prismatic (the flange's height), J4 revolute about z. yaw = J1 + J2 + J4.
-/// Beam direction in W: (cos e cos yaw, cos e sin yaw, -sin e) with e the beam depression; the focus lies
-/// `flange_to_focus_m` along it from the flange's center. Table: tilt A about the axis through `tilt_axis_W` along -y
-/// (A > 0 brings the object's top towards the robot, -x), then rotation C about the tilted z: X_WO = T(tilt_axis_W) *
-/// Ry(-A) * T(0, 0, plate_height_m + post_height_m) * Rz(C).
+/// Frames: W world = B robot base, +z up, J1's axis at the origin, the table on +x. F flange. T tool: origin
+/// at the focus, +z along the beam. R table; O object: on the fixture's post, +z along the C axis, z = 0 at
+/// the post's top. Arm (SCARA): J1, J2 revolute about z, J3 prismatic (the flange's height), J4 revolute
+/// about z. yaw = J1 + J2 + J4. Beam direction in W: (cos e cos yaw, cos e sin yaw, -sin e) with e the beam
+/// depression; the focus lies `flange_to_focus_m` along it from the flange's center. Table: tilt A about the
+/// axis through `tilt_axis_W` along -y (A > 0 brings the object's top towards the robot, -x), then rotation C
+/// about the tilted z: X_WO = T(tilt_axis_W) * Ry(-A) * T(0, 0, plate_height_m + post_height_m) * Rz(C).
 namespace hilbrush {
 
 inline constexpr std::size_t kAxisCount = 6;
@@ -38,7 +38,7 @@ inline constexpr Chain kTableChain{kTilt, 2};
 
 /// How a controller leads its joints from rest to rest.
 enum class Interpolation {
-  kUnknown,      ///< moves must be clear under both of the others; time model and simulation take kIndependent
+  kUnknown,  ///< moves must be clear under both of the others; time model and simulation take kIndependent
   kIndependent,  ///< each joint at its own limits: all start together, each arrives when it can
   kCoordinated   ///< one time law for all joints, slow enough for each: a straight line in joint space
 };
@@ -49,7 +49,7 @@ struct AxisDescription {
   double acceleration_max = 0;   ///< rad/s2 or m/s2
   double settle_saturation = 0;  ///< the move at which settling takes longest, rad or m
   double home = 0;               ///< where homing ends
-  double time_factor = 1;        ///< measured duration of its moves over that by speed_max and acceleration_max
+  double time_factor = 1;  ///< measured duration of its moves over that by speed_max and acceleration_max
 };
 
 /// How paint responds to x = dose / full dose; coverage in 0..1.

@@ -13,8 +13,8 @@ DoseResult find_dose(const CellDescription& cell, double pitch_m, double level) 
   const double max_j = laser.power_max_w * laser.pulse_max_s;
   if (!(energy_j >= min_j && energy_j <= max_j)) {
     const auto millijoules = [](double value_j) { return number(value_j * 1e3, 3); };
-    return {std::nullopt, "needs " + millijoules(energy_j) + " mJ, the laser gives " + millijoules(min_j) + " to " +
-                              millijoules(max_j) + " mJ"};
+    return {std::nullopt, "needs " + millijoules(energy_j) + " mJ, the laser gives " + millijoules(min_j) +
+                              " to " + millijoules(max_j) + " mJ"};
   }
   const double power_w = std::clamp(energy_j / laser.pulse_s, laser.power_min_w, laser.power_max_w);
   const double pulse_s = std::clamp(energy_j / power_w, laser.pulse_min_s, laser.pulse_max_s);

@@ -8,7 +8,8 @@
 
 #include "planner/cell_model/cell_description.h"
 
-/// The result of planning, which the executor runs: exposures in order, and the way-points of the moves between them.
+/// The result of planning, which the executor runs: exposures in order, and the way-points of the moves
+/// between them.
 namespace hilbrush {
 
 struct Exposure {
@@ -22,8 +23,8 @@ struct Exposure {
   std::uint32_t dot_index = 0;  ///< in dots.ply
 };
 
-/// A way-point passed (at rest, laser off) before `before_exposure`; several in order of appearance. before_exposure ==
-/// exposures.size(): on the path home.
+/// A way-point passed (at rest, laser off) before `before_exposure`; several in order of appearance.
+/// before_exposure == exposures.size(): on the path home.
 struct Via {
   std::uint32_t before_exposure = 0;
   Joints joints{};
@@ -34,8 +35,9 @@ struct Provenance {
   std::string model_sha256, settings_sha256, cell_sha256, version;
 };
 
-/// What a program `found` was made for instead of what is `wanted`: "another cell", "another model", "other settings";
-/// empty if these agree. The version is not compared: programs of other versions may be read, but are not painted.
+/// What a program `found` was made for instead of what is `wanted`: "another cell", "another model", "other
+/// settings"; empty if these agree. The version is not compared: programs of other versions may be read, but
+/// are not painted.
 std::string provenance_mismatch(const Provenance& found, const Provenance& wanted);
 
 struct ExposureProgram {

@@ -25,7 +25,8 @@ inline const char* planning_name(Planning planning) {
 
 /// In which order dots are exposed.
 enum class DotOrder {
-  kImproved,  ///< tours over the dots that one pose of the table serves, along the curve and then improved locally
+  kImproved,  ///< tours over the dots that one pose of the table serves, along the curve and then improved
+              ///< locally
   kCurve      ///< such tours along the curve as it is
 };
 
@@ -41,8 +42,8 @@ inline const char* order_name(DotOrder order) {
 /// How poses follow from dots.
 enum class PosePolicy {
   kSearch,       ///< many dots share a pose of the table
-  kFollowNormal  ///< the baseline: dots as they come, the table turned for each so that the beam meets it along the
-                 ///< normal
+  kFollowNormal  ///< the baseline: dots as they come, the table turned for each so that the beam meets it
+                 ///< along the normal
 };
 
 inline constexpr EnumName<PosePolicy> kPolicyNames[] = {
@@ -55,9 +56,10 @@ inline const char* policy_name(PosePolicy policy) {
 }
 
 struct PlanOptions {
-  double max_incidence = std::numbers::pi / 4;        ///< rad, against the face normal; never exceeded
-  double preferred_incidence = std::numbers::pi / 9;  ///< rad, against the smooth normal; exceeded only where a dot
-                                                      ///< cannot be exposed within it. Less than 5 degrees count as 5
+  double max_incidence = std::numbers::pi / 4;  ///< rad, against the face normal; never exceeded
+  double preferred_incidence =
+      std::numbers::pi / 9;  ///< rad, against the smooth normal; exceeded only where a dot
+                             ///< cannot be exposed within it. Less than 5 degrees count as 5
   Planning planning = Planning::kBalanced;
   DotOrder order = DotOrder::kImproved;
   PosePolicy policy = PosePolicy::kSearch;

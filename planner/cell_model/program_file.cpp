@@ -16,7 +16,8 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "records are written as they lie in memory");
 
-constexpr std::string_view kMagic = "ply\nformat binary_little_endian 1.0\ncomment hilbrush exposure program 1\n";
+constexpr std::string_view kMagic =
+    "ply\nformat binary_little_endian 1.0\ncomment hilbrush exposure program 1\n";
 constexpr std::string_view kHashKey = "comment sha256_of_all_below ";
 constexpr std::size_t kHashDigits = 64;
 constexpr std::size_t kHeaderBytesMax = 8192;
@@ -28,12 +29,14 @@ constexpr std::string_view kExposureProperties =
     "property double x\nproperty double y\nproperty double z\n"
     "property float nx\nproperty float ny\nproperty float nz\n"
     "property float tone\nproperty float energy\n"
-    "property double j1\nproperty double j2\nproperty double j3\nproperty double j4\nproperty double a\nproperty "
+    "property double j1\nproperty double j2\nproperty double j3\nproperty double j4\nproperty double "
+    "a\nproperty "
     "double c\n"
     "property float power\nproperty float pulse\nproperty float incidence\nproperty uint dot\n";
 constexpr std::string_view kViaProperties =
     "property uint before\n"
-    "property double j1\nproperty double j2\nproperty double j3\nproperty double j4\nproperty double a\nproperty "
+    "property double j1\nproperty double j2\nproperty double j3\nproperty double j4\nproperty double "
+    "a\nproperty "
     "double c\n";
 
 /// What the header says besides the layout.
@@ -101,12 +104,14 @@ void for_each_field(Via& via, Field field) {
 }
 
 template <class Record>
-void write_records(std::ostream& out, Sha256& hash, const std::vector<Record>& records, std::size_t record_bytes) {
+void write_records(std::ostream& out, Sha256& hash, const std::vector<Record>& records,
+                   std::size_t record_bytes) {
   std::vector<std::uint8_t> block(kBlockRecords * record_bytes);
   for (std::size_t first = 0; first < records.size(); first += kBlockRecords) {
     std::uint8_t* at = block.data();
     const std::size_t last = std::min(first + kBlockRecords, records.size());
-    for (std::size_t i = first; i < last; ++i) for_each_field(records[i], [&at](const auto& value) { put(at, value); });
+    for (std::size_t i = first; i < last; ++i)
+      for_each_field(records[i], [&at](const auto& value) { put(at, value); });
     const std::size_t bytes = static_cast<std::size_t>(at - block.data());
     hash.update(std::span(block.data(), bytes));
     out.write(reinterpret_cast<const char*>(block.data()), static_cast<std::streamsize>(bytes));
@@ -114,7 +119,8 @@ void write_records(std::ostream& out, Sha256& hash, const std::vector<Record>& r
 }
 
 template <class Record>
-std::vector<Record> read_records(std::istream& in, Sha256& hash, std::size_t count, std::size_t record_bytes) {
+std::vector<Record> read_records(std::istream& in, Sha256& hash, std::size_t count,
+                                 std::size_t record_bytes) {
   std::vector<Record> records(count);
   std::vector<std::uint8_t> block(kBlockRecords * record_bytes);
   for (std::size_t first = 0; first < count; first += kBlockRecords) {
@@ -123,7 +129,8 @@ std::vector<Record> read_records(std::istream& in, Sha256& hash, std::size_t cou
     if (!in.read(reinterpret_cast<char*>(block.data()), static_cast<std::streamsize>(bytes))) return {};
     hash.update(std::span(block.data(), bytes));
     const std::uint8_t* at = block.data();
-    for (std::size_t i = first; i < last; ++i) for_each_field(records[i], [&at](auto& value) { take(at, value); });
+    for (std::size_t i = first; i < last; ++i)
+      for_each_field(records[i], [&at](auto& value) { take(at, value); });
   }
   return records;
 }
@@ -176,7 +183,8 @@ Number to_number(std::string_view text, const char* what, const std::filesystem:
   return number;
 }
 
-/// Parses the hashed part of the header. What it does not understand is caught by writing it again: see read_header.
+/// Parses the hashed part of the header. What it does not understand is caught by writing it again: see
+/// read_header.
 Header parse_header(std::string_view text, const std::filesystem::path& file) {
   Header header;
   header.provenance.model_sha256 = take_line(text, "comment model_sha256 ", file);
@@ -184,7 +192,8 @@ Header parse_header(std::string_view text, const std::filesystem::path& file) {
   header.provenance.cell_sha256 = take_line(text, "comment cell_sha256 ", file);
   header.provenance.version = take_line(text, "comment version ", file);
   header.pitch_m = to_number<double>(take_line(text, "comment pitch_m ", file), "pitch_m", file);
-  header.exposure_count = to_number<std::uint64_t>(take_line(text, "element vertex ", file), "exposure count", file);
+  header.exposure_count =
+      to_number<std::uint64_t>(take_line(text, "element vertex ", file), "exposure count", file);
   if (text.substr(0, kExposureProperties.size()) != kExposureProperties)
     refuse(file, "its exposures have other properties than this version's");
   text.remove_prefix(kExposureProperties.size());
@@ -192,13 +201,16 @@ Header parse_header(std::string_view text, const std::filesystem::path& file) {
   return header;
 }
 
-/// Leaves `in` at the first exposure. The hash's value goes to `expected_hash`, what it covers of the header to `hash`.
-Header read_header(std::istream& in, const std::filesystem::path& file, Sha256& hash, std::string& expected_hash) {
+/// Leaves `in` at the first exposure. The hash's value goes to `expected_hash`, what it covers of the header
+/// to `hash`.
+Header read_header(std::istream& in, const std::filesystem::path& file, Sha256& hash,
+                   std::string& expected_hash) {
   std::string bytes(kHeaderBytesMax, '\0');
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   bytes.resize(static_cast<std::size_t>(in.gcount()));
   in.clear();
-  if (!std::string_view(bytes).starts_with(kMagic)) refuse(file, "is not an exposure program of this version");
+  if (!std::string_view(bytes).starts_with(kMagic))
+    refuse(file, "is not an exposure program of this version");
 
   std::string_view rest = std::string_view(bytes).substr(kMagic.size());
   expected_hash = take_line(rest, kHashKey, file);
@@ -219,8 +231,9 @@ void check_size(const Header& header, std::istream& in, const std::filesystem::p
   constexpr std::uint64_t kCountMax = std::numeric_limits<std::uint32_t>::max();
   if (header.exposure_count > kCountMax || header.via_count > kCountMax ||
       body != header.exposure_count * kExposureBytes + header.via_count * kViaBytes)
-    refuse(file, "is cut short or has bytes too many: its header announces " + std::to_string(header.exposure_count) +
-                     " exposures and " + std::to_string(header.via_count) + " way-points");
+    refuse(file, "is cut short or has bytes too many: its header announces " +
+                     std::to_string(header.exposure_count) + " exposures and " +
+                     std::to_string(header.via_count) + " way-points");
 }
 
 void check_vias(const ExposureProgram& program, const std::filesystem::path& file) {
@@ -272,7 +285,8 @@ ExposureProgram read_program(const std::filesystem::path& file) {
   program.exposures = read_records<Exposure>(in, hash, header.exposure_count, kExposureBytes);
   program.vias = read_records<Via>(in, hash, header.via_count, kViaBytes);
   if (!in) refuse(file, "cannot be read to its end");
-  if (hash.hex_digest() != expected_hash) refuse(file, "is damaged: its SHA-256 is not the one in its header");
+  if (hash.hex_digest() != expected_hash)
+    refuse(file, "is damaged: its SHA-256 is not the one in its header");
   check_vias(program, file);
   return program;
 }

@@ -6,10 +6,12 @@
 
 namespace hilbrush {
 
-TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program, const TimeVisitor& visit) {
+TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program,
+                        const TimeVisitor& visit) {
   TimeSplit time;
   Joints at = home_joints(cell);
-  double ringing_s = 0;  // settling that is left over from way-points passed without it, see Run::move of the executor
+  double ringing_s =
+      0;  // settling that is left over from way-points passed without it, see Run::move of the executor
   const auto move_to = [&](const Joints& to, double& spent_s) {
     const double travel_s = move_s(cell, at, to);
     ringing_s = std::max(settle_s(cell, at, to), ringing_s - travel_s);

@@ -20,10 +20,11 @@ struct TimeSplit {
 using TimeVisitor = std::function<void(std::size_t exposure, const TimeSplit& so_far)>;
 
 /// From home to home.
-TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program, const TimeVisitor& visit = {});
+TimeSplit estimate_time(const CellDescription& cell, const ExposureProgram& program,
+                        const TimeVisitor& visit = {});
 
-/// A lower bound for any order and any poses: each exposure's shortest settling, its pulse and a move of one control
-/// tick.
+/// A lower bound for any order and any poses: each exposure's shortest settling, its pulse and a move of one
+/// control tick.
 double least_time_s(const CellDescription& cell, const ExposureProgram& program);
 
 }  // namespace hilbrush

@@ -18,7 +18,8 @@ double trapezoid_position(double distance, double speed_max, double acceleration
   if (time_s >= whole_s) return distance;
   const double ramp_s = std::min(speed_max / acceleration_max, whole_s / 2);
   if (time_s <= ramp_s) return .5 * acceleration_max * time_s * time_s;
-  if (time_s >= whole_s - ramp_s) return distance - .5 * acceleration_max * (whole_s - time_s) * (whole_s - time_s);
+  if (time_s >= whole_s - ramp_s)
+    return distance - .5 * acceleration_max * (whole_s - time_s) * (whole_s - time_s);
   return .5 * acceleration_max * ramp_s * ramp_s + speed_max * (time_s - ramp_s);
 }
 
@@ -37,7 +38,8 @@ SharedLaw shared_law(const CellDescription& cell, Chain chain, const Joints& fro
   for (std::size_t i = chain.first; i < chain.first + chain.count; ++i) {
     const double distance = std::abs(to[i] - from[i]);
     if (distance == 0) continue;
-    law.time_factor = law.is_move ? std::max(law.time_factor, cell.axes[i].time_factor) : cell.axes[i].time_factor;
+    law.time_factor =
+        law.is_move ? std::max(law.time_factor, cell.axes[i].time_factor) : cell.axes[i].time_factor;
     law.speed_max = std::min(law.speed_max, cell.axes[i].speed_max / distance);
     law.acceleration_max = std::min(law.acceleration_max, cell.axes[i].acceleration_max / distance);
     law.is_move = true;
@@ -55,9 +57,9 @@ double chain_move_s(const CellDescription& cell, Chain chain, Interpolation inte
   }
   double slowest_s = 0;
   for (std::size_t i = chain.first; i < chain.first + chain.count; ++i)
-    slowest_s =
-        std::max(slowest_s, cell.axes[i].time_factor * trapezoid_s(std::abs(to[i] - from[i]), cell.axes[i].speed_max,
-                                                                   cell.axes[i].acceleration_max));
+    slowest_s = std::max(
+        slowest_s, cell.axes[i].time_factor * trapezoid_s(std::abs(to[i] - from[i]), cell.axes[i].speed_max,
+                                                          cell.axes[i].acceleration_max));
   return slowest_s;
 }
 
@@ -65,15 +67,16 @@ void put_chain(const CellDescription& cell, Chain chain, Interpolation interpola
                const Joints& to, double time_s, Joints& now) {
   const bool is_coordinated = interpolation == Interpolation::kCoordinated;
   const SharedLaw law = is_coordinated ? shared_law(cell, chain, from, to) : SharedLaw{};
-  const double share = is_coordinated && law.is_move
-                           ? trapezoid_position(1, law.speed_max, law.acceleration_max, time_s / law.time_factor)
-                           : 1;
+  const double share =
+      is_coordinated && law.is_move
+          ? trapezoid_position(1, law.speed_max, law.acceleration_max, time_s / law.time_factor)
+          : 1;
   for (std::size_t i = chain.first; i < chain.first + chain.count; ++i) {
     const double distance = std::abs(to[i] - from[i]);
-    const double covered = is_coordinated
-                               ? share * distance
-                               : trapezoid_position(distance, cell.axes[i].speed_max, cell.axes[i].acceleration_max,
-                                                    time_s / cell.axes[i].time_factor);
+    const double covered =
+        is_coordinated ? share * distance
+                       : trapezoid_position(distance, cell.axes[i].speed_max, cell.axes[i].acceleration_max,
+                                            time_s / cell.axes[i].time_factor);
     // The end is exact, whatever the sum would round to.
     now[i] = covered >= distance ? to[i] : from[i] + std::copysign(covered, to[i] - from[i]);
   }

@@ -1,9 +1,9 @@
 #pragma once
 #include "planner/cell_model/cell_description.h"
 
-/// How long the cell takes and where its axes are meanwhile: trapezoidal speeds, slowest axis, settle that grows with
-/// the move. Standard library and Eigen only, so that the daemon's ETA and the simulated devices' tests can compare
-/// against it.
+/// How long the cell takes and where its axes are meanwhile: trapezoidal speeds, slowest axis, settle that
+/// grows with the move. Standard library and Eigen only, so that the daemon's ETA and the simulated devices'
+/// tests can compare against it.
 namespace hilbrush {
 
 /// Rest to rest over `distance` (>= 0) with a trapezoidal speed profile.
@@ -13,7 +13,8 @@ double trapezoid_position(double distance, double speed_max, double acceleration
 /// One chain from rest to rest, with the measured time factors; not rounded.
 double chain_move_s(const CellDescription& cell, Chain chain, Interpolation interpolation, const Joints& from,
                     const Joints& to);
-/// Puts the joints of a chain where they are `time_s` into the move; the other joints of `now` are left alone.
+/// Puts the joints of a chain where they are `time_s` into the move; the other joints of `now` are left
+/// alone.
 void put_chain(const CellDescription& cell, Chain chain, Interpolation interpolation, const Joints& from,
                const Joints& to, double time_s, Joints& now);
 /// Where all joints are `time_s` into a move of both chains at once, by the cell's interpolation.

@@ -58,8 +58,10 @@ CheckCell::CheckCell(const TexturedMesh& mesh, const CellDescription& cell)
       beam_F_(std::cos(cell.arm.beam_depression), 0, -std::sin(cell.arm.beam_depression)),
       rays_(std::make_unique<Rays>(mesh)) {
   const double focus_m = cell.arm.flange_to_focus_m;
-  lens_ = {(focus_m - cell.lens.far_m) * beam_F_, beam_F_, cell.lens.far_m - cell.lens.near_m, cell.lens.radius_m};
-  quill_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), cell.arm.quill_length_m, cell.arm.quill_radius_m};
+  lens_ = {(focus_m - cell.lens.far_m) * beam_F_, beam_F_, cell.lens.far_m - cell.lens.near_m,
+           cell.lens.radius_m};
+  quill_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), cell.arm.quill_length_m,
+            cell.arm.quill_radius_m};
   reach_m_ = std::hypot(cell.table.plate_radius_m, cell.fixture.post_height_m + cell.table.plate_thickness_m);
   for (const auto& p : mesh.vertices) reach_m_ = std::max(reach_m_, p.norm());
   const std::size_t stride = std::max<std::size_t>(1, mesh.vertices.size() / kWitnesses);
@@ -86,8 +88,8 @@ Eigen::Isometry3d CheckCell::X_OF(const Joints& joints) const {
   return X_WO(joints).inverse() * X_WF(joints);
 }
 
-/// How far before the focus a ray from the lens, `aside_O` beside the beam, meets the first surface; nothing if it
-/// meets none.
+/// How far before the focus a ray from the lens, `aside_O` beside the beam, meets the first surface; nothing
+/// if it meets none.
 std::optional<double> CheckCell::lands_short_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
                                                const Eigen::Vector3d& aside_O, double beyond_m) const {
   const double length_m = cell_.lens.far_m;
@@ -114,7 +116,9 @@ std::string CheckCell::beam_fault(const Eigen::Isometry3d& X_OF, double toleranc
   const Eigen::Vector3d focus = focus_O(X_OF);
   const Eigen::Vector3d beam = beam_O(X_OF);
   const double length_m = cell_.lens.far_m;
-  const auto lands = [&](const std::optional<double>& short_m) { return short_m && std::abs(*short_m) <= tolerance_m; };
+  const auto lands = [&](const std::optional<double>& short_m) {
+    return short_m && std::abs(*short_m) <= tolerance_m;
+  };
   const auto short_m = lands_short_m(focus, beam, Eigen::Vector3d::Zero(), 1.5 * tolerance_m);
   if (!lands(short_m)) {
     // A dot on an edge is met or missed by rounding: then one of the rays close by decides.
@@ -162,8 +166,8 @@ bool CheckCell::is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O,
   return std::any_of(std::begin(rays.tfar), std::end(rays.tfar), [](float t) { return t < 0; });
 }
 
-/// A packet of rays along the mantle of the body and its axis; and vertices of the object inside it, for bodies that
-/// are wide enough for all rays to miss the object.
+/// A packet of rays along the mantle of the body and its axis; and vertices of the object inside it, for
+/// bodies that are wide enough for all rays to miss the object.
 bool CheckCell::touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const {
   const Eigen::Vector3d u = body.axis_F.unitOrthogonal();
   const Eigen::Vector3d v = body.axis_F.cross(u);
@@ -216,7 +220,8 @@ bool CheckCell::touches_table(const Cylinder& body, const Eigen::Isometry3d& X_O
   return false;
 }
 
-std::string CheckCell::body_fault(const Cylinder& body, const char* name, const Eigen::Isometry3d& X_OB) const {
+std::string CheckCell::body_fault(const Cylinder& body, const char* name,
+                                  const Eigen::Isometry3d& X_OB) const {
   // Nothing touches if the ball around the body is clear of the ball around everything else.
   const double ball_m = std::hypot(.5 * body.length_m, body.radius_m);
   const Eigen::Vector3d middle_O = X_OB * (body.from_F + .5 * body.length_m * body.axis_F);
@@ -231,8 +236,8 @@ std::string CheckCell::body_fault(const Eigen::Isometry3d& X_OF) const {
   return fault.empty() ? body_fault(quill_, "the quill", X_OF) : fault;
 }
 
-/// The link lies along x of its frame, whose origin is at its first joint. Its rounded ends are checked by rays from
-/// their centers.
+/// The link lies along x of its frame, whose origin is at its first joint. Its rounded ends are checked by
+/// rays from their centers.
 std::string CheckCell::link_fault(const CellDescription::Arm::Link& link, double length_m, const char* name,
                                   const Eigen::Isometry3d& X_WB, const Eigen::Isometry3d& X_WF,
                                   const Eigen::Isometry3d& X_OW) const {
@@ -258,12 +263,14 @@ std::string CheckCell::link_fault(const CellDescription::Arm::Link& link, double
   for (int i = 0; i <= kLensPoints; ++i) {
     const Eigen::Vector3d p_B = X_BF * (lens_.from_F + (lens_.length_m * i / kLensPoints) * lens_.axis_F);
     const Eigen::Vector3d nearest_B(std::clamp(p_B.x(), 0., length_m), 0, 0);
-    if ((p_B - nearest_B).norm() < link.radius_m + lens_.radius_m) return std::string(name) + " touches the lens body";
+    if ((p_B - nearest_B).norm() < link.radius_m + lens_.radius_m)
+      return std::string(name) + " touches the lens body";
   }
   return {};
 }
 
-/// The column against the table's side as any other body; points along the axes of lens, quill and forearm against it.
+/// The column against the table's side as any other body; points along the axes of lens, quill and forearm
+/// against it.
 std::string CheckCell::column_fault(const Eigen::Isometry3d& X_WF, const Eigen::Isometry3d& X_W_fore,
                                     const Eigen::Isometry3d& X_OW) const {
   const auto& column = cell_.arm.column;
@@ -281,7 +288,8 @@ std::string CheckCell::column_fault(const Eigen::Isometry3d& X_WF, const Eigen::
   const auto touches = [&](const Cylinder& body, const Eigen::Isometry3d& X_WB) {
     constexpr int kPoints = 24;
     for (int i = 0; i <= kPoints; ++i)
-      if (is_near(X_WB * (body.from_F + (body.length_m * i / kPoints) * body.axis_F), body.radius_m)) return true;
+      if (is_near(X_WB * (body.from_F + (body.length_m * i / kPoints) * body.axis_F), body.radius_m))
+        return true;
     return false;
   };
   if (touches(lens_, X_WF)) return "the lens body touches the robot's column";
@@ -300,9 +308,9 @@ std::string CheckCell::body_fault(const Joints& joints) const {
   const auto& arm = cell_.arm;
   const Eigen::Isometry3d upper =
       Translation3d(0, 0, arm.upper_link.height_m) * AngleAxisd(joints[kJ1], Vector3d::UnitZ());
-  const Eigen::Isometry3d fore = AngleAxisd(joints[kJ1], Vector3d::UnitZ()) * Translation3d(arm.upper_arm_m, 0, 0) *
-                                 AngleAxisd(joints[kJ2], Vector3d::UnitZ()) *
-                                 Translation3d(0, 0, arm.fore_link.height_m);
+  const Eigen::Isometry3d fore =
+      AngleAxisd(joints[kJ1], Vector3d::UnitZ()) * Translation3d(arm.upper_arm_m, 0, 0) *
+      AngleAxisd(joints[kJ2], Vector3d::UnitZ()) * Translation3d(0, 0, arm.fore_link.height_m);
   std::string fault = link_fault(arm.fore_link, arm.forearm_m, "the forearm", fore, X_WF_now, X_OW);
   if (!fault.empty()) return fault;
   fault = link_fault(arm.upper_link, arm.upper_arm_m, "the upper arm", upper, X_WF_now, X_OW);

@@ -9,9 +9,9 @@
 #include "planner/cell_model/cell_description.h"
 #include "sampling/model/textured_mesh.h"
 
-/// The cell as the program check sees it: forward kinematics as a chain of transforms, the tool as a bundle of rays,
-/// table parts by inside tests. Written apart from kinematics and clearance, which planning uses, so that it does not
-/// repeat their faults. Thread-safe after construction.
+/// The cell as the program check sees it: forward kinematics as a chain of transforms, the tool as a bundle
+/// of rays, table parts by inside tests. Written apart from kinematics and clearance, which planning uses, so
+/// that it does not repeat their faults. Thread-safe after construction.
 namespace hilbrush {
 
 class CheckCell {
@@ -53,8 +53,8 @@ class CheckCell {
                            const Eigen::Isometry3d& X_OW) const;
   bool touches_object(const Cylinder& body, const Eigen::Isometry3d& X_OB) const;
   bool touches_table(const Cylinder& body, const Eigen::Isometry3d& X_OB) const;
-  bool is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O, const std::array<Eigen::Vector3d, 16>& along_O,
-                      double length_m) const;
+  bool is_any_blocked(const std::array<Eigen::Vector3d, 16>& from_O,
+                      const std::array<Eigen::Vector3d, 16>& along_O, double length_m) const;
   Eigen::Isometry3d X_WF(const Joints& joints) const;
   Eigen::Isometry3d X_WO(const Joints& joints) const;
   bool is_in_table(const Eigen::Vector3d& p_O) const;

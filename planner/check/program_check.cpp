@@ -49,12 +49,12 @@ CellDescription with_gap(CellDescription cell, double gap_m) {
   return cell;
 }
 
-/// The joints first..last of one controller on their way. All of them take the share of the move that the weakest
-/// allows, or each its own.
+/// The joints first..last of one controller on their way. All of them take the share of the move that the
+/// weakest allows, or each its own.
 class ControllerMove {
  public:
-  ControllerMove(const CellDescription& cell, std::size_t first, std::size_t last, const Joints& from, const Joints& to,
-                 bool is_coordinated)
+  ControllerMove(const CellDescription& cell, std::size_t first, std::size_t last, const Joints& from,
+                 const Joints& to, bool is_coordinated)
       : cell_(cell), first_(first), last_(last), from_(from), to_(to), is_coordinated_(is_coordinated) {
     whole_.speed_max = whole_.acceleration_max = std::numeric_limits<double>::infinity();
     for (std::size_t axis = first; axis <= last; ++axis) {
@@ -78,11 +78,11 @@ class ControllerMove {
       const double distance = to_[axis] - from_[axis];
       if (distance == 0) continue;
       const double factor = cell_.axes[axis].time_factor;
-      now[axis] =
-          is_coordinated_
-              ? from_[axis] + distance * axis_position(1, time_s / factor_, whole_)
-              : from_[axis] +
-                    std::copysign(axis_position(std::abs(distance), time_s / factor, cell_.axes[axis]), distance);
+      now[axis] = is_coordinated_
+                      ? from_[axis] + distance * axis_position(1, time_s / factor_, whole_)
+                      : from_[axis] + std::copysign(axis_position(std::abs(distance), time_s / factor,
+                                                                  cell_.axes[axis]),
+                                                    distance);
     }
   }
 
@@ -99,7 +99,8 @@ class ControllerMove {
 
 /// The motions that one controller may make.
 std::vector<ControllerMove> controller_moves(const CellDescription& cell, std::size_t first, std::size_t last,
-                                             Interpolation interpolation, const Joints& from, const Joints& to) {
+                                             Interpolation interpolation, const Joints& from,
+                                             const Joints& to) {
   std::vector<ControllerMove> moves;
   if (interpolation != Interpolation::kCoordinated) moves.emplace_back(cell, first, last, from, to, false);
   // Of one joint both are the same.
@@ -151,28 +152,34 @@ void ProgramCheck::check_counts(const std::vector<SkippedDot>& skipped, Faults& 
   std::vector<std::uint8_t> seen(dots_.dots.size(), 0);
   const auto count = [&](std::uint32_t dot, std::size_t exposure, const char* where) {
     if (dot >= seen.size())
-      faults.push_back({fmt::format("dot {}, {}, is not one of the {} dots", dot, where, seen.size()), exposure});
+      faults.push_back(
+          {fmt::format("dot {}, {}, is not one of the {} dots", dot, where, seen.size()), exposure});
     else if (seen[dot]++)
       faults.push_back({fmt::format("dot {}, {}, occurs more than once", dot, where), exposure});
   };
-  for (std::size_t i = 0; i < program_.exposures.size(); ++i) count(program_.exposures[i].dot_index, i, "exposed");
+  for (std::size_t i = 0; i < program_.exposures.size(); ++i)
+    count(program_.exposures[i].dot_index, i, "exposed");
   for (const auto& s : skipped) {
     count(s.dot_index, program_.exposures.size(), "skipped");
     if (s.detail.empty())
-      faults.push_back({fmt::format("dot {} is skipped without a reason", s.dot_index), program_.exposures.size()});
+      faults.push_back(
+          {fmt::format("dot {} is skipped without a reason", s.dot_index), program_.exposures.size()});
   }
   const auto missing = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), 0));
   if (missing > 0)
-    faults.push_back({fmt::format("{} dots are neither exposed nor skipped", missing), program_.exposures.size()});
+    faults.push_back(
+        {fmt::format("{} dots are neither exposed nor skipped", missing), program_.exposures.size()});
   if (!(program_.pitch_m > 0) || std::abs(program_.pitch_m - dots_.pitch_m) > 1e-12)
-    faults.push_back({fmt::format("the pitch is {:.6g} m, the dots' {:.6g} m", program_.pitch_m, dots_.pitch_m), 0});
+    faults.push_back(
+        {fmt::format("the pitch is {:.6g} m, the dots' {:.6g} m", program_.pitch_m, dots_.pitch_m), 0});
 }
 
 void ProgramCheck::check_vias(Faults& faults) const {
   std::size_t previous = 0;
   for (const Via& via : program_.vias) {
     if (via.before_exposure < previous || via.before_exposure > program_.exposures.size())
-      faults.push_back({fmt::format("a way-point before exposure {} is out of order", via.before_exposure), previous});
+      faults.push_back(
+          {fmt::format("a way-point before exposure {} is out of order", via.before_exposure), previous});
     previous = via.before_exposure;
     check_limits(via.joints, via.before_exposure, faults);
   }
@@ -214,9 +221,10 @@ void ProgramCheck::check_limits(const Joints& joints, std::size_t i, Faults& fau
     if (is_inside(axis, value)) continue;
     const bool is_length = axis == kJ3;
     const double unit = is_length ? 1e-3 : kDegree;
-    faults.push_back({fmt::format("{} at {:.6g} {} is outside {:.6g} to {:.6g}", kAxisNames[axis], value / unit,
-                                  is_length ? "mm" : "degrees", limits.min / unit, limits.max / unit),
-                      i});
+    faults.push_back(
+        {fmt::format("{} at {:.6g} {} is outside {:.6g} to {:.6g}", kAxisNames[axis], value / unit,
+                     is_length ? "mm" : "degrees", limits.min / unit, limits.max / unit),
+         i});
   }
 }
 
@@ -225,7 +233,8 @@ void ProgramCheck::check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Fault
   if (exposure.dot_index >= dots_.dots.size()) return;  // counted already
   const Dot& dot = dots_.dots[exposure.dot_index];
   if (exposure.position_O != dot.position_O || exposure.normal_O != dot.normal_O || exposure.tone != dot.tone)
-    faults.push_back({fmt::format("position, normal or tone differs from that of dot {}", exposure.dot_index), i});
+    faults.push_back(
+        {fmt::format("position, normal or tone differs from that of dot {}", exposure.dot_index), i});
 
   const double off_m = (check_cell_.focus_O(X_OF) - dot.position_O).norm();
   if (!(off_m <= kFocusToleranceM))
@@ -233,8 +242,8 @@ void ProgramCheck::check_dot(std::size_t i, const Eigen::Isometry3d& X_OF, Fault
   const double cosine = -check_cell_.beam_O(X_OF).dot(dot.normal_O.cast<double>().normalized());
   const double incidence = std::acos(std::clamp(cosine, -1., 1.));
   if (!(incidence <= options_.max_incidence + kIncidenceTolerance))
-    faults.push_back({fmt::format("the beam meets the face at {:.3f} degrees, more than {:.3f}", incidence / kDegree,
-                                  options_.max_incidence / kDegree),
+    faults.push_back({fmt::format("the beam meets the face at {:.3f} degrees, more than {:.3f}",
+                                  incidence / kDegree, options_.max_incidence / kDegree),
                       i});
   // acos is steep near 0: compare cosines.
   if (!(std::abs(std::cos(static_cast<double>(exposure.incidence)) - cosine) <= kIncidenceTolerance))
@@ -261,7 +270,8 @@ void ProgramCheck::check_dose(std::size_t i, Faults& faults) const {
   if (exposure.dot_index >= dots_.dots.size()) return;
   const double wanted = dots_.dots[exposure.dot_index].level * full_energy_j(cell_, dots_.pitch_m);
   if (!within(energy, wanted, wanted))
-    faults.push_back({fmt::format("{:.6g} J is not the {:.6g} J that the dot's level needs", energy, wanted), i});
+    faults.push_back(
+        {fmt::format("{:.6g} J is not the {:.6g} J that the dot's level needs", energy, wanted), i});
 }
 
 void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
@@ -271,13 +281,15 @@ void ProgramCheck::check_exposure(std::size_t i, Faults& faults) const {
   if (!is_inside(joints)) return;
   const Eigen::Isometry3d X_OF = check_cell_.X_OF(joints);
   check_dot(i, X_OF, faults);
-  if (auto fault = check_cell_.beam_fault(X_OF, kLandingToleranceM); !fault.empty()) faults.push_back({fault, i});
+  if (auto fault = check_cell_.beam_fault(X_OF, kLandingToleranceM); !fault.empty())
+    faults.push_back({fault, i});
   if (auto fault = check_cell_.body_fault(joints); !fault.empty()) faults.push_back({fault, i});
 }
 
-/// What may only happen with the tool retracted, never on a leg that begins or ends at a dot: an elbow flip, more than
-/// half a turn of J4 or C at once.
-void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i, Faults& faults) const {
+/// What may only happen with the tool retracted, never on a leg that begins or ends at a dot: an elbow flip,
+/// more than half a turn of J4 or C at once.
+void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::size_t i,
+                                    Faults& faults) const {
   if (from[kJ2] * to[kJ2] < 0) faults.push_back({"the elbow flips without a retract", i});
   for (const std::size_t axis : {kJ4, kRotation}) {
     const double turn = std::abs(to[axis] - from[axis]);
@@ -287,8 +299,9 @@ void ProgramCheck::check_leg_at_dot(const Joints& from, const Joints& to, std::s
   }
 }
 
-std::string ProgramCheck::motion_fault(const ControllerMove& robot, const ControllerMove& table, double robot_late_s,
-                                       double table_late_s, int step_count, const Joints& from) const {
+std::string ProgramCheck::motion_fault(const ControllerMove& robot, const ControllerMove& table,
+                                       double robot_late_s, double table_late_s, int step_count,
+                                       const Joints& from) const {
   const double end_s = std::max(robot.end_s() + robot_late_s, table.end_s() + table_late_s);
   for (int k = 1; k <= step_count; ++k) {
     Joints now = from;
@@ -309,13 +322,15 @@ void ProgramCheck::check_leg(const Joints& from, const Joints& to, std::size_t i
   const int step_count = static_cast<int>(std::ceil(std::max(travel_m, sweep_m) / kCheckStepM));
   const double late_s = cell_.motion.start_lag_s;
   for (const ControllerMove& robot : controller_moves(cell_, kJ1, kJ4, cell_.motion.robot, from, to))
-    for (const ControllerMove& table : controller_moves(cell_, kTilt, kRotation, cell_.motion.table, from, to)) {
+    for (const ControllerMove& table :
+         controller_moves(cell_, kTilt, kRotation, cell_.motion.table, from, to)) {
       const bool has_lag = late_s > 0 && robot.moving() > 0 && table.moving() > 0;
       std::string fault = motion_fault(robot, table, 0, 0, step_count, from);
       if (fault.empty() && has_lag) fault = motion_fault(robot, table, late_s, 0, step_count, from);
       if (fault.empty() && has_lag) fault = motion_fault(robot, table, 0, late_s, step_count, from);
       if (fault.empty()) continue;
-      faults.push_back({fmt::format("on the path there, {} or comes within {:.1f} mm", fault, kGapOnLegsM * 1e3), i});
+      faults.push_back(
+          {fmt::format("on the path there, {} or comes within {:.1f} mm", fault, kGapOnLegsM * 1e3), i});
       return;
     }
 }
@@ -337,10 +352,11 @@ void ProgramCheck::check_path(std::size_t i, Faults& faults) const {
 
 }  // namespace
 
-std::vector<ProgramFault> check_program(const ExposureProgram& program, const std::vector<SkippedDot>& skipped,
-                                        const DotSequence& dots, const TexturedMesh& mesh, const CellDescription& cell,
-                                        const PlanOptions& options, std::size_t limit, const Progress& progress,
-                                        const Provenance* made_from) {
+std::vector<ProgramFault> check_program(const ExposureProgram& program,
+                                        const std::vector<SkippedDot>& skipped, const DotSequence& dots,
+                                        const TexturedMesh& mesh, const CellDescription& cell,
+                                        const PlanOptions& options, std::size_t limit,
+                                        const Progress& progress, const Provenance* made_from) {
   const ProgramCheck check(program, dots, mesh, cell, options);
   Faults faults;
   check.check_counts(skipped, faults);

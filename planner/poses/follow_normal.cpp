@@ -23,7 +23,8 @@ class NormalFollower {
       const int count = 6 * ring;
       for (int i = 0; i < count; ++i) {
         const double turn = kTurn * i / count;
-        cone_.emplace_back(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn), std::cos(angle));
+        cone_.emplace_back(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn),
+                           std::cos(angle));
       }
     }
   }
@@ -69,7 +70,8 @@ class NormalFollower {
     double best_s = 0;
     for (const double tilt : tilts(beam_O)) {
       for (const TableSolution& solution : solve_table(reach_.kinematics(), tilt, beam_O)) {
-        const double rotation = reach_.kinematics().unwrap_near(kRotation, solution.rotation, now_[kRotation]);
+        const double rotation =
+            reach_.kinematics().unwrap_near(kRotation, solution.rotation, now_[kRotation]);
         const TablePose table = reach_.kinematics().table_pose(tilt, rotation);
         for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
           const auto joints = reach_.arm_joints(table, position_O, solution.yaw, elbow, now_);
@@ -93,8 +95,8 @@ class NormalFollower {
 
 }  // namespace
 
-PosedDots follow_normal(const Reach& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices,
-                        const Progress& progress) {
+PosedDots follow_normal(const Reach& reach, const DotSequence& dots,
+                        std::span<const std::uint32_t> dot_indices, const Progress& progress) {
   NormalFollower follower(reach);
   PosedDots posed;
   posed.sequence.reserve(dot_indices.size());

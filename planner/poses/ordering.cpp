@@ -15,7 +15,8 @@ constexpr std::int64_t kKickWindow = 1000;
 constexpr std::size_t kTourBlock = 1 << 15;  // dots that are improved together
 constexpr std::int32_t kNone = -1;           // beyond an end of the path
 constexpr float kMinGainS = 1e-6F;
-/// The share of the time saved by turning the tool that is counted: turns add up, so not all of it can be realized.
+/// The share of the time saved by turning the tool that is counted: turns add up, so not all of it can be
+/// realized.
 constexpr float kTurnShare = .7F;
 
 /// The cost of a step; beyond the ends of the path there is none.
@@ -23,7 +24,8 @@ class PathCost {
  public:
   PathCost(const CellDescription& cell, std::span<const PathDot> path) : path_(path), step_(cell) {}
 
-  float operator()(std::int32_t a, std::int32_t b, float enough_s = std::numeric_limits<float>::infinity()) const {
+  float operator()(std::int32_t a, std::int32_t b,
+                   float enough_s = std::numeric_limits<float>::infinity()) const {
     if (a == kNone || b == kNone) return 0;
     const PathDot &from = path_[static_cast<std::size_t>(a)], &to = path_[static_cast<std::size_t>(b)];
     return step_.with_turn(from.arm, to.arm, from.per_yaw, to.per_yaw, kTurnShare, enough_s);
@@ -52,7 +54,8 @@ class Neighbors {
       high = high.max(path[i].position_O.array());
       if (i > 0) steps.push_back((path[i].position_O - path[i - 1].position_O).norm());
     }
-    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
+                     steps.end());
     low_ = low;
     const float extent = (high - low).maxCoeff();
     size_ = std::max({2 * steps[steps.size() / 2], extent / 1000, 1e-7F});
@@ -113,8 +116,9 @@ class Neighbors {
         for (auto it = begin; it != end; ++it) {
           const std::int32_t other = order_[static_cast<std::size_t>(it - keys_.begin())];
           if (static_cast<std::size_t>(other) != i)
-            found.emplace_back((path_[i].position_O - path_[static_cast<std::size_t>(other)].position_O).squaredNorm(),
-                               other);
+            found.emplace_back(
+                (path_[i].position_O - path_[static_cast<std::size_t>(other)].position_O).squaredNorm(),
+                other);
         }
       }
   }
@@ -129,8 +133,8 @@ class Neighbors {
   std::vector<Neighbor> near_;
 };
 
-/// The path as an array of dots, and its local improvement. Every change of the path is made of reversals of stretches,
-/// so that a list of reversals suffices to undo a failed attempt.
+/// The path as an array of dots, and its local improvement. Every change of the path is made of reversals of
+/// stretches, so that a list of reversals suffices to undo a failed attempt.
 class LocalSearch {
  public:
   LocalSearch(const CellDescription& cell, std::span<const PathDot> path)
@@ -180,8 +184,9 @@ class LocalSearch {
  private:
   std::int64_t place(std::int32_t dot) const { return place_of_[static_cast<std::size_t>(dot)]; }
   std::int32_t at(std::int64_t place) const {
-    return place < 0 || place >= static_cast<std::int64_t>(dot_at_.size()) ? kNone
-                                                                           : dot_at_[static_cast<std::size_t>(place)];
+    return place < 0 || place >= static_cast<std::int64_t>(dot_at_.size())
+               ? kNone
+               : dot_at_[static_cast<std::size_t>(place)];
   }
   /// Of an edge of the path, which mostly joins neighbors.
   float edge_s(std::int32_t a, std::int32_t b) const {
@@ -273,7 +278,8 @@ class LocalSearch {
     if (is_logging_) log_.emplace_back(first, last);
     std::reverse(dot_at_.begin() + first, dot_at_.begin() + last + 1);
     for (std::int64_t p = first; p <= last; ++p)
-      place_of_[static_cast<std::size_t>(dot_at_[static_cast<std::size_t>(p)])] = static_cast<std::int32_t>(p);
+      place_of_[static_cast<std::size_t>(dot_at_[static_cast<std::size_t>(p)])] =
+          static_cast<std::int32_t>(p);
   }
 
   /// The segment from `a` to `e` goes between `c` and the dot `beyond` it, `a` next to `c`.

@@ -24,13 +24,15 @@ std::vector<Tour> tours_of(const SharedBeams& beams, std::vector<std::uint32_t>&
   std::vector<Tour> tours(beams.beams_O.size());
   for (std::size_t k = 0; k < tours.size(); ++k) tours[k].beam_O = beams.beams_O[k];
   for (std::size_t i = 0; i < beams.of_dot.size(); ++i)
-    (beams.of_dot[i] == kNoBeam ? unserved : tours[beams.of_dot[i]].dots).push_back(static_cast<std::uint32_t>(i));
+    (beams.of_dot[i] == kNoBeam ? unserved : tours[beams.of_dot[i]].dots)
+        .push_back(static_cast<std::uint32_t>(i));
   std::erase_if(tours, [](const Tour& tour) { return tour.dots.empty(); });
   return tours;
 }
 
 /// Moves dots that their tour's station turns out not to serve to `unserved`.
-void remove_unserved_dots(const DotsToPose& dots, std::vector<Tour>& tours, std::vector<std::uint32_t>& unserved) {
+void remove_unserved_dots(const DotsToPose& dots, std::vector<Tour>& tours,
+                          std::vector<std::uint32_t>& unserved) {
   std::vector<std::vector<std::uint32_t>> of_tour(tours.size());
   tbb::parallel_for(std::size_t{0}, tours.size(), [&](std::size_t t) {
     std::erase_if(tours[t].dots, [&](std::uint32_t dot) {
@@ -39,13 +41,15 @@ void remove_unserved_dots(const DotsToPose& dots, std::vector<Tour>& tours, std:
       return true;
     });
   });
-  for (const auto& dots_of_tour : of_tour) unserved.insert(unserved.end(), dots_of_tour.begin(), dots_of_tour.end());
+  for (const auto& dots_of_tour : of_tour)
+    unserved.insert(unserved.end(), dots_of_tour.begin(), dots_of_tour.end());
   std::erase_if(tours, [](const Tour& tour) { return tour.dots.empty(); });
 }
 
-/// Sets C by the shortest turn from the tour before. Returns the joints at the tour's first dot, with J4 by the
-/// shortest turn.
-Joints unwrap_near(const Reach& reach, const Eigen::Vector3d& first_O, const Joints& before, Station& station) {
+/// Sets C by the shortest turn from the tour before. Returns the joints at the tour's first dot, with J4 by
+/// the shortest turn.
+Joints unwrap_near(const Reach& reach, const Eigen::Vector3d& first_O, const Joints& before,
+                   Station& station) {
   station.rotation = reach.kinematics().unwrap_near(kRotation, station.rotation, before[kRotation]);
   // J4 stays away from its limits, so that it need not unwind within the tour.
   const double middle = (reach.kinematics().axis_min(kJ4) + reach.kinematics().axis_max(kJ4)) / 2;
@@ -61,12 +65,14 @@ Joints unwrap_near(const Reach& reach, const Eigen::Vector3d& first_O, const Joi
 }
 
 /// The tour's dots with their joints, in the order in which they are exposed.
-std::vector<PosedDot> posed_tour(const DotsToPose& dots, const PoseCosts& costs, Tour& tour, const Joints& first) {
+std::vector<PosedDot> posed_tour(const DotsToPose& dots, const PoseCosts& costs, Tour& tour,
+                                 const Joints& first) {
   const Reach& reach = dots.reach();
   std::vector<Joints> joints;
   joints.reserve(tour.dots.size());
   for (const std::uint32_t dot : tour.dots) {
-    const auto found = joints_at(reach, tour.station, dots.position_O(dot), joints.empty() ? first : joints.back());
+    const auto found =
+        joints_at(reach, tour.station, dots.position_O(dot), joints.empty() ? first : joints.back());
     CHECK(found.has_value());  // unserved dots have been removed
     joints.push_back(*found);
   }
@@ -94,11 +100,12 @@ std::vector<PosedDot> posed_tour(const DotsToPose& dots, const PoseCosts& costs,
 
 }  // namespace
 
-PosedDots search_poses(const Reach& reach, const DotSequence& dots, std::span<const std::uint32_t> dot_indices,
-                       const Progress& progress) {
+PosedDots search_poses(const Reach& reach, const DotSequence& dots,
+                       std::span<const std::uint32_t> dot_indices, const Progress& progress) {
   const DotsToPose to_pose(reach, dots, dot_indices);
   PoseCosts costs = pose_costs(reach.options());
-  // The more dots, the nearer to the shortest possible step all of them are, and the sooner a fast plan is wanted.
+  // The more dots, the nearer to the shortest possible step all of them are, and the sooner a fast plan is
+  // wanted.
   if (reach.options().planning == Planning::kFast)
     costs.kicks = std::min(costs.kicks, kMaxKicksOfFastPlan / std::max<std::size_t>(1, dot_indices.size()));
   PosedDots posed;
@@ -123,7 +130,8 @@ PosedDots search_poses(const Reach& reach, const DotSequence& dots, std::span<co
   }
   std::vector<std::vector<PosedDot>> parts(tours.size());
   for_batches(tours.size(), kToursAtOnce, progress.part(.7, 1), [&](std::size_t begin, std::size_t end) {
-    tbb::parallel_for(begin, end, [&](std::size_t t) { parts[t] = posed_tour(to_pose, costs, tours[t], first[t]); });
+    tbb::parallel_for(begin, end,
+                      [&](std::size_t t) { parts[t] = posed_tour(to_pose, costs, tours[t], first[t]); });
   });
   posed.sequence.reserve(dot_indices.size());
   before = home_joints(reach.cell());

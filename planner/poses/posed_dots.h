@@ -6,8 +6,8 @@
 #include "sampling/base/progress.h"
 #include "sampling/dots/dots.h"
 
-/// The result of pose search: which dots are exposed, in which order, with which joints. The program builder adds how
-/// the axes get from one to the next.
+/// The result of pose search: which dots are exposed, in which order, with which joints. The program builder
+/// adds how the axes get from one to the next.
 namespace hilbrush {
 
 struct PosedDot {

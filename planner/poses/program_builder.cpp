@@ -120,8 +120,8 @@ class ProgramBuilder {
     exposure.power_w = dose->power_w;
     exposure.pulse_s = dose->pulse_s;
     exposure.joints = posed.joints;
-    exposure.incidence =
-        static_cast<float>(std::acos(std::clamp(-beam_O.dot(dot.normal_O.cast<double>().normalized()), -1., 1.)));
+    exposure.incidence = static_cast<float>(
+        std::acos(std::clamp(-beam_O.dot(dot.normal_O.cast<double>().normalized()), -1., 1.)));
     exposure.dot_index = posed.dot_index;
     program_.exposures.push_back(exposure);
     now_ = posed.joints;
@@ -138,8 +138,8 @@ class ProgramBuilder {
 
 }  // namespace
 
-void build_program(const Reach& reach, const DotSequence& dots, const PosedDots& posed, ExposureProgram& program,
-                   std::vector<SkippedDot>& skipped, const Progress& progress) {
+void build_program(const Reach& reach, const DotSequence& dots, const PosedDots& posed,
+                   ExposureProgram& program, std::vector<SkippedDot>& skipped, const Progress& progress) {
   const std::size_t count = posed.sequence.size();
   program.exposures.reserve(count);
   ProgramBuilder builder(reach, dots, program, skipped);

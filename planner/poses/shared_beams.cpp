@@ -124,14 +124,14 @@ class BeamLocation {
   BeamDirections directions_;
   std::vector<std::vector<Service>> serves_;                          ///< by direction
   std::vector<std::vector<std::pair<std::uint32_t, float>>> served_;  ///< by sample
-  std::vector<float> cost_s_;                                         ///< of each sampled dot with the open directions
+  std::vector<float> cost_s_;  ///< of each sampled dot with the open directions
   std::vector<bool> is_open_;
   std::vector<std::uint32_t> open_;
   double weight_ = 0;  ///< dots that a sampled dot stands for
 };
 
-/// One block of the curve: each dot's clear directions, then the cheapest sequence of them, where a change of direction
-/// has its cost (Viterbi).
+/// One block of the curve: each dot's clear directions, then the cheapest sequence of them, where a change of
+/// direction has its cost (Viterbi).
 class BeamAssignment {
  public:
   BeamAssignment(const DotsToPose& dots, const PoseCosts& costs, std::span<const Eigen::Vector3d> beams_O)
@@ -158,13 +158,15 @@ class BeamAssignment {
     for (std::size_t k = 0; k < beams_O_.size(); ++k) {
       const double cosine = -beams_O_[k].dot(target.smooth_normal_O);
       if (cosine >= cos_preferred && dots_.reach().is_clear(target, beams_O_[k]))
-        candidates_.push_back({static_cast<std::uint16_t>(k), static_cast<float>(incidence_cost_s(costs_, cosine))});
+        candidates_.push_back(
+            {static_cast<std::uint16_t>(k), static_cast<float>(incidence_cost_s(costs_, cosine))});
     }
   }
 
   /// Dots without candidates are skipped. Returns the last candidate of the cheapest sequence.
   std::uint32_t find_cheapest() {
-    std::vector<std::uint32_t> latest(beams_O_.size(), UINT32_MAX);  // candidate of the dot before, by direction
+    std::vector<std::uint32_t> latest(beams_O_.size(),
+                                      UINT32_MAX);  // candidate of the dot before, by direction
     std::uint32_t best_before = UINT32_MAX;
     std::size_t before_begin = 0;
     std::size_t before_end = 0;
@@ -180,12 +182,14 @@ class BeamAssignment {
           candidate.from = is_kept ? same : best_before;
           candidate.cost_s += is_kept ? candidates_[same].cost_s : switched;
         }
-        if (best == UINT32_MAX || candidate.cost_s < candidates_[best].cost_s) best = static_cast<std::uint32_t>(c);
+        if (best == UINT32_MAX || candidate.cost_s < candidates_[best].cost_s)
+          best = static_cast<std::uint32_t>(c);
       }
       for (std::size_t c = before_begin; c < before_end; ++c) latest[candidates_[c].beam] = UINT32_MAX;
       before_begin = first_[i];
       before_end = first_[i + 1];
-      const float offset = candidates_[best].cost_s;  // sums stay small, so that single precision keeps its digits
+      const float offset =
+          candidates_[best].cost_s;  // sums stay small, so that single precision keeps its digits
       for (std::size_t c = before_begin; c < before_end; ++c) {
         candidates_[c].cost_s -= offset;
         latest[candidates_[c].beam] = static_cast<std::uint32_t>(c);
@@ -227,14 +231,28 @@ double incidence_cost_s(const PoseCosts& costs, double cosine) {
 PoseCosts pose_costs(const PlanOptions& options) {
   switch (options.planning) {
     case Planning::kFast:
-      return {.incidence_s = .001, .repose_s = .6, .switch_s = .02, .spacing = 7 * kDegree, .sample = 1500, .kicks = 2};
+      return {.incidence_s = .001,
+              .repose_s = .6,
+              .switch_s = .02,
+              .spacing = 7 * kDegree,
+              .sample = 1500,
+              .kicks = 2};
     case Planning::kBalanced:
-      return {
-          .incidence_s = .0025, .repose_s = .6, .switch_s = .02, .spacing = 6 * kDegree, .sample = 3000, .kicks = 2};
+      return {.incidence_s = .0025,
+              .repose_s = .6,
+              .switch_s = .02,
+              .spacing = 6 * kDegree,
+              .sample = 3000,
+              .kicks = 2};
     case Planning::kQuality:
       break;
   }
-  return {.incidence_s = .06, .repose_s = .6, .switch_s = .02, .spacing = 4 * kDegree, .sample = 6000, .kicks = 2};
+  return {.incidence_s = .06,
+          .repose_s = .6,
+          .switch_s = .02,
+          .spacing = 4 * kDegree,
+          .sample = 6000,
+          .kicks = 2};
 }
 
 SharedBeams choose_shared_beams(const DotsToPose& dots, const PoseCosts& costs, const Progress& progress) {

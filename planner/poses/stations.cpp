@@ -28,8 +28,8 @@ double repose_s(const CellDescription& cell, const Joints& a, const Joints& b) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     double distance = std::abs(a[i] - b[i]);
     if (i == kRotation || i == kJ4) distance = std::abs(std::remainder(distance, kTurn));
-    slowest_s = std::max(slowest_s, cell.axes[i].time_factor *
-                                        trapezoid_s(distance, cell.axes[i].speed_max, cell.axes[i].acceleration_max));
+    slowest_s = std::max(slowest_s, cell.axes[i].time_factor * trapezoid_s(distance, cell.axes[i].speed_max,
+                                                                           cell.axes[i].acceleration_max));
   }
   const bool is_flip = (a[kJ2] >= 0) != (b[kJ2] >= 0);
   return slowest_s + (is_flip ? 2 * cell.timing.retract_s : 0);
@@ -37,7 +37,8 @@ double repose_s(const CellDescription& cell, const Joints& a, const Joints& b) {
 
 class StationChoice {
  public:
-  StationChoice(const DotsToPose& dots, std::vector<Tour>& tours) : dots_(dots), reach_(dots.reach()), tours_(tours) {}
+  StationChoice(const DotsToPose& dots, std::vector<Tour>& tours)
+      : dots_(dots), reach_(dots.reach()), tours_(tours) {}
 
   void find_options() {
     options_.resize(tours_.size());
@@ -102,7 +103,8 @@ class StationChoice {
     for (const double tilt : reach_.tilts()) {
       for (const TableSolution& solution : solve_table(reach_.kinematics(), tilt, tour.beam_O))
         for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative})
-          if (auto option = rate(tour, {tilt, solution.rotation, solution.yaw, elbow})) options.push_back(*option);
+          if (auto option = rate(tour, {tilt, solution.rotation, solution.yaw, elbow}))
+            options.push_back(*option);
     }
     std::stable_sort(options.begin(), options.end(),
                      [](const Option& a, const Option& b) { return a.work_s < b.work_s; });
@@ -133,7 +135,8 @@ class StationChoice {
     if (served == 0) return std::nullopt;
     const auto n = static_cast<double>(count);
     const double mean_step_s = steps > 0 ? step_sum_s / static_cast<double>(steps) : 0;
-    option.work_s = n * (mean_step_s + kUnservedDotS * (1 - static_cast<double>(served) / static_cast<double>(rated)));
+    option.work_s =
+        n * (mean_step_s + kUnservedDotS * (1 - static_cast<double>(served) / static_cast<double>(rated)));
     return option;
   }
 
@@ -200,10 +203,12 @@ class StationChoice {
 
   bool move_tour(std::size_t i, double min_gain_s) {
     const std::size_t tour = at(i);
-    const double removed = distance_s(at(i - 1), tour) + distance_s(tour, at(i + 1)) - distance_s(at(i - 1), at(i + 1));
+    const double removed =
+        distance_s(at(i - 1), tour) + distance_s(tour, at(i + 1)) - distance_s(at(i - 1), at(i + 1));
     for (std::size_t j = 0; j <= order_.size(); ++j) {  // between positions j and j + 1
       if (j == i || j + 1 == i) continue;
-      const double added = distance_s(at(j), tour) + distance_s(tour, at(j + 1)) - distance_s(at(j), at(j + 1));
+      const double added =
+          distance_s(at(j), tour) + distance_s(tour, at(j + 1)) - distance_s(at(j), at(j + 1));
       if (removed - added <= min_gain_s) continue;
       const auto first = order_.begin();
       const auto from = static_cast<std::ptrdiff_t>(i - 1);
@@ -230,7 +235,8 @@ class StationChoice {
       from[k].resize(options.size());
       for (std::size_t o = 0; o < options.size(); ++o)
         for (std::size_t p = 0; p < cost_s.size(); ++p) {
-          const double cost = cost_s[p] + options[o].work_s + repose_s(reach_.cell(), joints[p], options[o].joints);
+          const double cost =
+              cost_s[p] + options[o].work_s + repose_s(reach_.cell(), joints[p], options[o].joints);
           if (cost >= next_cost_s[o]) continue;
           next_cost_s[o] = cost;
           next_joints[o] = options[o].joints;

@@ -6,8 +6,8 @@
 
 #include "planner/reach/kinematics.h"
 
-/// The time model for the innermost loops of the search: move and settle between two exposures from one pose of the
-/// table, in single precision. Agrees with move_s() + settle_s() - settle_min_s to a rounding.
+/// The time model for the innermost loops of the search: move and settle between two exposures from one pose
+/// of the table, in single precision. Agrees with move_s() + settle_s() - settle_min_s to a rounding.
 namespace hilbrush {
 
 /// J1..J4.
@@ -32,17 +32,19 @@ class StepCost {
       ramps_[i] = static_cast<float>(axis.speed_max * axis.speed_max / axis.acceleration_max);
       inverse_speed_[i] = static_cast<float>(factor / axis.speed_max);
       ramp_s_[i] = static_cast<float>(factor * axis.speed_max / axis.acceleration_max);
-      inverse_saturation_[i] = axis.settle_saturation > 0 ? static_cast<float>(1 / axis.settle_saturation) : 0;
+      inverse_saturation_[i] =
+          axis.settle_saturation > 0 ? static_cast<float>(1 / axis.settle_saturation) : 0;
     }
   }
 
   /// Seconds above the shortest settling.
   float operator()(const ArmJoints& from, const ArmJoints& to) const { return cost_s(difference(from, to)); }
 
-  /// The same if the tool turns a little during the move, by the angle that is best for the step: J1, J2 and J4 then
-  /// share a move that would otherwise be J1's and J2's alone. `per_yaw`: how the joints follow the yaw at either end.
-  /// Symmetric. `share` of the time saved is subtracted. From `enough_s` on the result may be a lower bound that is not
-  /// below `enough_s`: most callers only compare steps, and a bound is enough for that.
+  /// The same if the tool turns a little during the move, by the angle that is best for the step: J1, J2 and
+  /// J4 then share a move that would otherwise be J1's and J2's alone. `per_yaw`: how the joints follow the
+  /// yaw at either end. Symmetric. `share` of the time saved is subtracted. From `enough_s` on the result may
+  /// be a lower bound that is not below `enough_s`: most callers only compare steps, and a bound is enough
+  /// for that.
   float with_turn(const ArmJoints& from, const ArmJoints& to, const ArmJoints& from_per_yaw,
                   const ArmJoints& to_per_yaw, float share = 1,
                   float enough_s = std::numeric_limits<float>::infinity()) const {
@@ -115,8 +117,8 @@ class StepCost {
     }
     if (per_speed_s <= 0) return 0;
     const bool is_triangle = per_speed_s * per_speed_s <= per_acceleration_s2;
-    return factor *
-           (is_triangle ? 2 * std::sqrt(per_acceleration_s2) : per_speed_s + per_acceleration_s2 / per_speed_s);
+    return factor * (is_triangle ? 2 * std::sqrt(per_acceleration_s2)
+                                 : per_speed_s + per_acceleration_s2 / per_speed_s);
   }
 
   /// std::ceil of what is over -1 and far below the largest int, which without SSE 4.1 is a call.

@@ -12,8 +12,8 @@
 namespace hilbrush {
 namespace {
 
-/// Where a dot cannot be exposed within the preferred incidence, its pose may deviate from the normal by this much more
-/// than the best one found, rad.
+/// Where a dot cannot be exposed within the preferred incidence, its pose may deviate from the normal by this
+/// much more than the best one found, rad.
 constexpr double kIncidenceAllowance = 4 * kDegree;
 constexpr std::size_t kAtOnce = 512;  // dots between two reports of progress
 /// Samples by which the next station is chosen.
@@ -31,15 +31,18 @@ struct UnservedDot {
 
 class UnservedDots {
  public:
-  UnservedDots(const DotsToPose& dots, std::vector<Tour>& tours) : dots_(dots), reach_(dots.reach()), tours_(tours) {}
+  UnservedDots(const DotsToPose& dots, std::vector<Tour>& tours)
+      : dots_(dots), reach_(dots.reach()), tours_(tours) {}
 
-  void find_poses(const std::vector<std::uint32_t>& dots, std::vector<SkippedDot>& skipped, const Progress& progress) {
+  void find_poses(const std::vector<std::uint32_t>& dots, std::vector<SkippedDot>& skipped,
+                  const Progress& progress) {
     unserved_.resize(dots.size());
     std::vector<SkippedDot> refused(dots.size());
     const Joints home = home_joints(reach_.cell());
     for_batches(dots.size(), kAtOnce, progress, [&](std::size_t begin, std::size_t end) {
       tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 16), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) find_pose(dots[i], home, unserved_[i], refused[i]);
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+          find_pose(dots[i], home, unserved_[i], refused[i]);
       });
     });
     for (std::size_t i = 0; i < dots.size(); ++i)
@@ -114,7 +117,8 @@ class UnservedDots {
     tbb::parallel_for(std::size_t{0}, poses, [&](std::size_t p) {
       const Station& station = unserved_[p * n / poses].station;
       const Eigen::Vector3d beam_O = beam_of(station);
-      for (std::size_t k = 0; k < dots; ++k) served[p] += serves(station, beam_O, unserved_[k * n / dots]) ? 1 : 0;
+      for (std::size_t k = 0; k < dots; ++k)
+        served[p] += serves(station, beam_O, unserved_[k * n / dots]) ? 1 : 0;
     });
     const auto best = std::max_element(served.begin(), served.end());
     return {static_cast<std::size_t>(best - served.begin()) * n / poses, *best};

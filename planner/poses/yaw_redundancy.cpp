@@ -27,8 +27,8 @@ struct YawGrid {
 
 class YawPath {
  public:
-  YawPath(const DotsToPose& dots, const PoseCosts& costs, const Station& station, std::span<const std::uint32_t> tour,
-          std::span<Joints> joints)
+  YawPath(const DotsToPose& dots, const PoseCosts& costs, const Station& station,
+          std::span<const std::uint32_t> tour, std::span<Joints> joints)
       : dots_(dots),
         costs_(costs),
         reach_(dots.reach()),
@@ -74,7 +74,8 @@ class YawPath {
     const Eigen::Vector3d& position_O = dots_.position_O(tour_[i]);
     for (int k = kTried; k > 0; --k) {
       const double turn = kMaxTurn * k / kTried;
-      const Eigen::Vector3d beam_O = table_.R_WO.transpose() * reach_.kinematics().beam_W(station_.yaw + side * turn);
+      const Eigen::Vector3d beam_O =
+          table_.R_WO.transpose() * reach_.kinematics().beam_W(station_.yaw + side * turn);
       if (reach_.clearance().lens_obstruction(position_O, beam_O) == Obstruction::kNone &&
           reach_.clearance().beam_obstruction(position_O, beam_O) == Obstruction::kNone)
         return static_cast<float>(turn);
@@ -105,8 +106,8 @@ class YawPath {
       connect(grid, before, now, &from_[(i - begin) * count]);
       std::swap(before, now);
     }
-    auto best =
-        static_cast<std::size_t>(std::min_element(before.cost_s.begin(), before.cost_s.end()) - before.cost_s.begin());
+    auto best = static_cast<std::size_t>(std::min_element(before.cost_s.begin(), before.cost_s.end()) -
+                                         before.cost_s.begin());
     for (std::size_t i = end; i-- > begin;) {
       steps_away_[i] += static_cast<int>(best) - grid.half;
       best = from_[(i - begin) * count + best];
@@ -176,7 +177,8 @@ class YawPath {
     const auto joints = reach_.arm_joints(table_, target.position_O, yaw, station_.elbow, joints_[i]);
     if (!joints) return;
     if (std::abs((*joints)[kJ4] - joints_[i][kJ4]) > 1) return;  // it would unwind
-    if (reach_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics().beam_W(yaw))) joints_[i] = *joints;
+    if (reach_.is_clear(target, table_.R_WO.transpose() * reach_.kinematics().beam_W(yaw)))
+      joints_[i] = *joints;
   }
 
   const DotsToPose& dots_;

@@ -48,10 +48,13 @@ Eigen::Vector3d flange_W(const CellDescription::Arm& arm, const Joints& joints) 
 
 std::array<Capsule, 2> arm_links_W(const CellDescription::Arm& arm, const Joints& joints) {
   const double forearm_angle = joints[kJ1] + joints[kJ2];
-  const Eigen::Vector2d elbow(arm.upper_arm_m * std::cos(joints[kJ1]), arm.upper_arm_m * std::sin(joints[kJ1]));
+  const Eigen::Vector2d elbow(arm.upper_arm_m * std::cos(joints[kJ1]),
+                              arm.upper_arm_m * std::sin(joints[kJ1]));
   const Eigen::Vector2d wrist =
       elbow + arm.forearm_m * Eigen::Vector2d(std::cos(forearm_angle), std::sin(forearm_angle));
-  const auto at = [](const Eigen::Vector2d& p, double height_m) { return Eigen::Vector3d(p.x(), p.y(), height_m); };
+  const auto at = [](const Eigen::Vector2d& p, double height_m) {
+    return Eigen::Vector3d(p.x(), p.y(), height_m);
+  };
   const auto& [upper, fore] = std::pair{arm.upper_link, arm.fore_link};
   return {Capsule{{0, 0, upper.height_m}, at(elbow, upper.height_m), upper.radius_m},
           Capsule{at(elbow, fore.height_m), at(wrist, fore.height_m), fore.radius_m}};
@@ -80,7 +83,8 @@ Capsule column_capsule_W(const CellDescription::Arm& arm) {
 }
 
 double column_gap_m(const CellDescription::Arm& arm, const Capsule& body) {
-  // A body above the top is at least that height away from it, whatever the rounded end of the column's capsule.
+  // A body above the top is at least that height away from it, whatever the rounded end of the column's
+  // capsule.
   const double above_m = std::min(body.from.z(), body.to.z()) - body.radius_m - arm.column.height_m;
   return std::max(above_m, capsule_gap_m(column_capsule_W(arm), body));
 }

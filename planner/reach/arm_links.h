@@ -5,8 +5,8 @@
 #include "planner/cell_model/cell_description.h"
 #include "planner/reach/kinematics.h"
 
-/// The shape of the arm: two links, capsules at fixed heights, turned by J1 and J2, through which the quill slides;
-/// lens and quill; and the column that the arm stands on.
+/// The shape of the arm: two links, capsules at fixed heights, turned by J1 and J2, through which the quill
+/// slides; lens and quill; and the column that the arm stands on.
 namespace hilbrush {
 
 struct Capsule {
@@ -33,7 +33,8 @@ Capsule quill_capsule_W(const CellDescription::Arm& arm, const Joints& joints);
 /// The robot's column, in W: the capsule that holds its cylinder.
 Capsule column_capsule_W(const CellDescription::Arm& arm);
 
-/// Between the column, which has a flat top, and a capsule beside or above it: a lower bound, exact beside it.
+/// Between the column, which has a flat top, and a capsule beside or above it: a lower bound, exact beside
+/// it.
 double column_gap_m(const CellDescription::Arm& arm, const Capsule& body);
 
 /// Between the surfaces; negative if they overlap.

@@ -16,7 +16,8 @@ BeamDirections::BeamDirections(double spacing) {
   }
 }
 
-std::vector<std::uint32_t> BeamDirections::that_hit(const Reach& reach, const Target& target, double cos_least) const {
+std::vector<std::uint32_t> BeamDirections::that_hit(const Reach& reach, const Target& target,
+                                                    double cos_least) const {
   std::vector<std::uint32_t> hitting;
   for (std::uint32_t d = 0; d < directions_O_.size(); ++d)
     if (-directions_O_[d].dot(target.smooth_normal_O) >= cos_least && reach.can_hit(target, directions_O_[d]))

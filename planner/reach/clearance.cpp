@@ -8,10 +8,11 @@
 namespace hilbrush {
 namespace {
 
-/// The ray starts this far from the dot: above the rounding of single precision, below any error that could be seen on
-/// the film.
+/// The ray starts this far from the dot: above the rounding of single precision, below any error that could
+/// be seen on the film.
 constexpr double kBeamStartM = 2e-6;
-/// The beam passes edges at this distance at least, except right at the dot, where its own surface is that near.
+/// The beam passes edges at this distance at least, except right at the dot, where its own surface is that
+/// near.
 constexpr double kBeamRadiusM = 20e-6, kSideBeamStartM = .3e-3;
 /// The beam passes post and plate at this distance at least.
 constexpr double kBeamTableGapM = .3e-3;
@@ -24,8 +25,8 @@ double cylinder_distance_m(double r, double z, double radius, double z_low, doub
   return std::sqrt(dr * dr + dz * dz);
 }
 
-/// Radius of object and table parts around an axis; `height` lifts O's origin above it. The tilt axis may pass them in
-/// any direction: the radius around it is that of a ball.
+/// Radius of object and table parts around an axis; `height` lifts O's origin above it. The tilt axis may
+/// pass them in any direction: the radius around it is that of a ball.
 double radius_around(const TexturedMesh& mesh, const CellDescription& cell, double height, bool around_tilt) {
   const auto along = [&](double r, double z) { return around_tilt ? std::hypot(r, z + height) : r; };
   const double post = cell.fixture.post_height_m;
@@ -53,8 +54,9 @@ bool links_come_near(const CellDescription& cell, double radius_around_tilt_m, d
 
 bool links_come_near_lens(const CellDescription& cell, double slack_m) {
   const auto& arm = cell.arm;
-  const double top_m = cell.axes[kJ3].max + slack_m + cell.lens.radius_m * std::cos(arm.beam_depression) +
-                       std::max(0., (cell.lens.far_m - arm.flange_to_focus_m) * std::sin(arm.beam_depression));
+  const double top_m =
+      cell.axes[kJ3].max + slack_m + cell.lens.radius_m * std::cos(arm.beam_depression) +
+      std::max(0., (cell.lens.far_m - arm.flange_to_focus_m) * std::sin(arm.beam_depression));
   const auto is_near = [&](const CellDescription::Arm::Link& link) {
     return link.radius_m > 0 && link.height_m - link.radius_m < top_m;
   };
@@ -69,8 +71,8 @@ bool column_comes_near(const CellDescription& cell, double radius_around_tilt_m,
 
 double tool_radius_m(const CellDescription& cell) {
   const auto& arm = cell.arm;
-  const double along_beam_m =
-      std::max(std::abs(cell.lens.far_m - arm.flange_to_focus_m), std::abs(arm.flange_to_focus_m - cell.lens.near_m));
+  const double along_beam_m = std::max(std::abs(cell.lens.far_m - arm.flange_to_focus_m),
+                                       std::abs(arm.flange_to_focus_m - cell.lens.near_m));
   return std::max({along_beam_m + cell.lens.radius_m, arm.quill_radius_m, arm.fore_link.radius_m});
 }
 
@@ -86,7 +88,8 @@ double field_range_m(const CellDescription& cell, bool has_links, bool has_colum
 
 Clearance::Clearance(const TexturedMesh& mesh, const CellDescription& cell)
     : cell_(cell),
-      radius_around_tilt_m_(radius_around(mesh, cell, cell.table.plate_height_m + cell.fixture.post_height_m, true)),
+      radius_around_tilt_m_(
+          radius_around(mesh, cell, cell.table.plate_height_m + cell.fixture.post_height_m, true)),
       radius_around_rotation_m_(radius_around(mesh, cell, 0, false)),
       links_may_touch_(links_come_near(cell, radius_around_tilt_m_, kSlackMaxM)),
       links_may_touch_lens_(links_come_near_lens(cell, kSlackMaxM)),
@@ -107,25 +110,28 @@ double Clearance::table_distance_m(const Eigen::Vector3d& p_O) const {
   const double z = p_O.z();
   const double post = cell_.fixture.post_height_m;
   if (z >= distance_.range_m()) return z;  // larger distances are not needed
-  return std::min(cylinder_distance_m(r, z, cell_.fixture.post_radius_m, -post, 0),
-                  cylinder_distance_m(r, z, cell_.table.plate_radius_m, -post - cell_.table.plate_thickness_m, -post));
+  return std::min(
+      cylinder_distance_m(r, z, cell_.fixture.post_radius_m, -post, 0),
+      cylinder_distance_m(r, z, cell_.table.plate_radius_m, -post - cell_.table.plate_thickness_m, -post));
 }
 
 Obstruction Clearance::beam_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
   // A beam that passes an edge by less than the distance of the side rays passes it by rounding alone.
   const Eigen::Vector3d u = kBeamRadiusM * beam_O.unitOrthogonal();
   const Eigen::Vector3d v = beam_O.cross(u);
-  if (rays_.is_beam_blocked(focus_O, -beam_O, {u, .866 * v - .5 * u, -.866 * v - .5 * u}, kBeamStartM, kSideBeamStartM,
-                            cell_.lens.far_m))
+  if (rays_.is_beam_blocked(focus_O, -beam_O, {u, .866 * v - .5 * u, -.866 * v - .5 * u}, kBeamStartM,
+                            kSideBeamStartM, cell_.lens.far_m))
     return Obstruction::kBeamObject;
-  return table_free_length_m(focus_O, beam_O) < cell_.lens.far_m ? Obstruction::kBeamTable : Obstruction::kNone;
+  return table_free_length_m(focus_O, beam_O) < cell_.lens.far_m ? Obstruction::kBeamTable
+                                                                 : Obstruction::kNone;
 }
 
-/// From the dot towards the lens in steps of the free distance. If the dot itself is nearer to the post than the gap,
-/// the beam only has to move away from it.
+/// From the dot towards the lens in steps of the free distance. If the dot itself is nearer to the post than
+/// the gap, the beam only has to move away from it.
 double Clearance::table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
   const double far_m = cell_.lens.far_m;
-  if (std::min(focus_O.z(), focus_O.z() - far_m * beam_O.z()) > kBeamTableGapM) return far_m;  // all of it is above
+  if (std::min(focus_O.z(), focus_O.z() - far_m * beam_O.z()) > kBeamTableGapM)
+    return far_m;  // all of it is above
   double free_m = table_distance_m(focus_O);
   const double gap_m = std::min(kBeamTableGapM, .9 * free_m);
   for (double t = 0; t < far_m; t += free_m) {
@@ -140,8 +146,8 @@ double Clearance::beam_free_length_m(const Eigen::Vector3d& focus_O, const Eigen
                   table_free_length_m(focus_O, beam_O));
 }
 
-Clearance::BallRow Clearance::cover(const Eigen::Vector3d& from_O, const Eigen::Vector3d& along_O, double length_m,
-                                    double radius_m, double half_step_m) {
+Clearance::BallRow Clearance::cover(const Eigen::Vector3d& from_O, const Eigen::Vector3d& along_O,
+                                    double length_m, double radius_m, double half_step_m) {
   const int count = std::max(1, static_cast<int>(std::ceil(length_m / (2 * half_step_m))));
   const double slice_m = length_m / count;
   return {from_O + .5 * slice_m * along_O,
@@ -154,13 +160,14 @@ Clearance::BallRow Clearance::cover(const Eigen::Vector3d& from_O, const Eigen::
 
 Clearance::BallRow Clearance::lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O,
                                        double half_step_m, double from_m) const {
-  return cover(focus_O - from_m * beam_O, -beam_O, cell_.lens.far_m - from_m, cell_.lens.radius_m, half_step_m);
+  return cover(focus_O - from_m * beam_O, -beam_O, cell_.lens.far_m - from_m, cell_.lens.radius_m,
+               half_step_m);
 }
 
 Clearance::BallRow Clearance::quill_row(const ToolPose& tool) const {
   const double radius_m = std::max(cell_.arm.quill_radius_m, 1e-3);
-  return cover(tool.focus_O - cell_.arm.flange_to_focus_m * tool.beam_O, tool.up_O, cell_.arm.quill_length_m, radius_m,
-               .4 * radius_m);
+  return cover(tool.focus_O - cell_.arm.flange_to_focus_m * tool.beam_O, tool.up_O, cell_.arm.quill_length_m,
+               radius_m, .4 * radius_m);
 }
 
 bool Clearance::is_far(const BallRow& row, double margin_m) const {
@@ -177,7 +184,8 @@ bool Clearance::keeps_margin(const BallRow& row) const {
     const Eigen::Vector3d p_O = row.first_O + i * row.step_O;
     const double free_m = std::min(distance_(p_O) - error_m, table_distance_m(p_O)) - kMarginM;
     if (free_m < row.ball_m) return false;
-    // A free ball covers the cylinder as far as its chord reaches: that many slices need no check of their own.
+    // A free ball covers the cylinder as far as its chord reaches: that many slices need no check of their
+    // own.
     const double chord_m = std::sqrt(free_m * free_m - row.cylinder_m * row.cylinder_m);
     i += std::max(1, 1 + static_cast<int>(std::floor((chord_m - .5 * row.slice_m) / row.slice_m)));
   }
@@ -201,11 +209,12 @@ Clearance::Slack Clearance::lens_slack(const Eigen::Vector3d& focus_O, const Eig
 }
 
 /// Small balls at the near end instead of a bulge, and thinner slices.
-Clearance::Slack Clearance::lens_slack_fine(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
+Clearance::Slack Clearance::lens_slack_fine(const Eigen::Vector3d& focus_O,
+                                            const Eigen::Vector3d& beam_O) const {
   Slack slack;
   const auto& lens = cell_.lens;
-  // 19 balls of .4 radius in two rings cover the end disc and the slice of .4 radius behind it: .2 above and below
-  // their centers they still are discs of .346 radius, and 19 discs of .275 radius would do.
+  // 19 balls of .4 radius in two rings cover the end disc and the slice of .4 radius behind it: .2 above and
+  // below their centers they still are discs of .346 radius, and 19 discs of .275 radius would do.
   const double ball_m = .4 * lens.radius_m;
   const double depth_m = .2 * lens.radius_m;
   const double front_m = lens.near_m + depth_m;
@@ -217,7 +226,8 @@ Clearance::Slack Clearance::lens_slack_fine(const Eigen::Vector3d& focus_O, cons
     for (const auto& [count, ring] : {std::pair{6, .50}, std::pair{12, .83}})
       for (int i = 0; i < count; ++i) {
         const double angle = 2 * std::numbers::pi * i / count;
-        reduce_clearance(center + ring * lens.radius_m * (std::cos(angle) * u + std::sin(angle) * v), ball_m, slack);
+        reduce_clearance(center + ring * lens.radius_m * (std::cos(angle) * u + std::sin(angle) * v), ball_m,
+                         slack);
       }
   }
   const double behind_m = lens.near_m + 4 * depth_m;
@@ -248,8 +258,8 @@ Clearance::Slack Clearance::column_slack(const TablePose& table) const {
 
 void Clearance::reduce_clearance(const Capsule& capsule_O, Slack& slack) const {
   const double length_m = std::max((capsule_O.to - capsule_O.from).norm(), 1e-6);
-  reduce_clearance(cover(capsule_O.from, (capsule_O.to - capsule_O.from) / length_m, length_m, capsule_O.radius_m,
-                         .3 * capsule_O.radius_m),
+  reduce_clearance(cover(capsule_O.from, (capsule_O.to - capsule_O.from) / length_m, length_m,
+                         capsule_O.radius_m, .3 * capsule_O.radius_m),
                    slack);
 }
 
@@ -265,8 +275,8 @@ double Clearance::column_tool_gap_m(const Joints& joints) const {
   const double nearest_m = passes ? l1 * std::sqrt(1 - cos_elbow * cos_elbow)
                                   : std::min(l1, std::sqrt(l1 * l1 + l2 * l2 + 2 * l1 * l2 * cos_elbow));
   if (nearest_m - tool_radius_m_ - arm.column.radius_m >= kSlackMaxM) return kSlackMaxM;
-  double gap_m = std::min(
-      {kSlackMaxM, column_gap_m(arm, lens_capsule_W(cell_, joints)), column_gap_m(arm, quill_capsule_W(arm, joints))});
+  double gap_m = std::min({kSlackMaxM, column_gap_m(arm, lens_capsule_W(cell_, joints)),
+                           column_gap_m(arm, quill_capsule_W(arm, joints))});
   if (arm.fore_link.radius_m > 0) gap_m = std::min(gap_m, column_gap_m(arm, arm_links_W(arm, joints)[1]));
   return gap_m;
 }
@@ -281,7 +291,8 @@ double Clearance::link_lens_gap_m(const Joints& joints) const {
 }
 
 Obstruction Clearance::lens_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const {
-  if (keeps_margin(lens_row(focus_O, beam_O, cell_.lens.radius_m / 3, cell_.lens.near_m))) return Obstruction::kNone;
+  if (keeps_margin(lens_row(focus_O, beam_O, cell_.lens.radius_m / 3, cell_.lens.near_m)))
+    return Obstruction::kNone;
   return lens_shortfall(focus_O, beam_O).what;
 }
 
@@ -308,9 +319,10 @@ Shortfall Clearance::quill_shortfall(const ToolPose& tool) const {
 
 Shortfall Clearance::links_shortfall(const TablePose& table, const Joints& joints) const {
   Shortfall worst = links_slack(table, joints).shortfall(Obstruction::kLinkObject, Obstruction::kLinkTable);
-  for (const Shortfall& other : {Shortfall{Obstruction::kLinkLens, kMarginM - link_lens_gap_m(joints)},
-                                 column_slack(table).shortfall(Obstruction::kColumnObject, Obstruction::kColumnTable),
-                                 Shortfall{Obstruction::kColumnTool, kMarginM - column_tool_gap_m(joints)}})
+  for (const Shortfall& other :
+       {Shortfall{Obstruction::kLinkLens, kMarginM - link_lens_gap_m(joints)},
+        column_slack(table).shortfall(Obstruction::kColumnObject, Obstruction::kColumnTable),
+        Shortfall{Obstruction::kColumnTool, kMarginM - column_tool_gap_m(joints)}})
     if (other.amount_m > worst.amount_m) worst = other;
   return worst;
 }
@@ -326,8 +338,8 @@ double Clearance::slack_m(const Kinematics& kinematics, const Joints& joints) co
   const double tool_m = slack_m(kinematics.tool_pose(joints));
   if (!arm_may_touch()) return tool_m;
   const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
-  return std::min({tool_m, links_slack(table, joints).least_m(), link_lens_gap_m(joints), column_slack(table).least_m(),
-                   column_tool_gap_m(joints)});
+  return std::min({tool_m, links_slack(table, joints).least_m(), link_lens_gap_m(joints),
+                   column_slack(table).least_m(), column_tool_gap_m(joints)});
 }
 
 }  // namespace hilbrush

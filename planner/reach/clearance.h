@@ -7,9 +7,9 @@
 #include "planner/reach/object_distance.h"
 #include "planner/reach/object_rays.h"
 
-/// Whether the beam, the lens body, the quill, the arm's links and the robot's column are clear of object, post and
-/// plate, which move as one rigid body, and of each other. Beams are rays (Embree); bodies are rows of balls looked up
-/// in a distance field, which is as fast and was tested against bundles of rays
+/// Whether the beam, the lens body, the quill, the arm's links and the robot's column are clear of object,
+/// post and plate, which move as one rigid body, and of each other. Beams are rays (Embree); bodies are rows
+/// of balls looked up in a distance field, which is as fast and was tested against bundles of rays
 /// (tests/planner/reach/clearance_test.cpp). Thread-safe after construction.
 namespace hilbrush {
 
@@ -39,8 +39,8 @@ class Clearance {
  public:
   Clearance(const TexturedMesh& mesh, const CellDescription& cell);
 
-  /// The distance that planning keeps between the tool and anything else at rest. Half of it is reserved for small
-  /// moves, see transit.h.
+  /// The distance that planning keeps between the tool and anything else at rest. Half of it is reserved for
+  /// small moves, see transit.h.
   static constexpr double kMarginM = 1e-3;
 
   /// What blocks the beam between the lens and the focus, or nothing.
@@ -53,8 +53,8 @@ class Clearance {
   /// The lens alone: it depends on nothing but the dot and the beam's direction in O.
   Obstruction lens_obstruction(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
   Obstruction quill_obstruction(const ToolPose& tool) const;
-  /// Upper arm and forearm, against object, table and the lens; the column, against those, the quill and the forearm.
-  /// Nothing is computed in a cell where they cannot meet.
+  /// Upper arm and forearm, against object, table and the lens; the column, against those, the quill and the
+  /// forearm. Nothing is computed in a cell where they cannot meet.
   Obstruction links_obstruction(const TablePose& table, const Joints& joints) const;
 
   /// The same with the amount, for the reason of dots that are skipped.
@@ -62,8 +62,8 @@ class Clearance {
   Shortfall quill_shortfall(const ToolPose& tool) const;
   Shortfall links_shortfall(const TablePose& table, const Joints& joints) const;
 
-  /// A lower bound on the distance between lens and quill and everything else; if negative, they may touch. At most
-  /// kSlackMaxM.
+  /// A lower bound on the distance between lens and quill and everything else; if negative, they may touch.
+  /// At most kSlackMaxM.
   double slack_m(const ToolPose& tool) const;
   /// ... and of the links, too.
   double slack_m(const Kinematics& kinematics, const Joints& joints) const;
@@ -85,8 +85,8 @@ class Clearance {
     int count;
     double ball_m, slice_m, cylinder_m;  ///< radius of a ball, length of a slice, radius of the cylinder
   };
-  static BallRow cover(const Eigen::Vector3d& from_O, const Eigen::Vector3d& along_O, double length_m, double radius_m,
-                       double half_step_m);
+  static BallRow cover(const Eigen::Vector3d& from_O, const Eigen::Vector3d& along_O, double length_m,
+                       double radius_m, double half_step_m);
   BallRow lens_row(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O, double half_step_m,
                    double from_m) const;
   BallRow quill_row(const ToolPose& tool) const;
@@ -105,10 +105,12 @@ class Clearance {
   double column_tool_gap_m(const Joints& joints) const;
   void reduce_clearance(const Capsule& capsule_O, Slack& slack) const;
   /// Whether links_obstruction() has anything to check.
-  bool arm_may_touch() const { return links_may_touch_ || links_may_touch_lens_ || cell_.arm.column.radius_m > 0; }
+  bool arm_may_touch() const {
+    return links_may_touch_ || links_may_touch_lens_ || cell_.arm.column.radius_m > 0;
+  }
   double table_free_length_m(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O) const;
-  /// To the plate and the post, in O; exact outside up to the field's range and never more than it is, not above zero
-  /// inside.
+  /// To the plate and the post, in O; exact outside up to the field's range and never more than it is, not
+  /// above zero inside.
   double table_distance_m(const Eigen::Vector3d& p_O) const;
 
   const CellDescription& cell_;

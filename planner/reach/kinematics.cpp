@@ -56,9 +56,9 @@ ToolPose Kinematics::tool_pose(const Joints& joints) const {
   const TablePose table = table_pose(joints[kTilt], joints[kRotation]);
   const double forearm_angle = joints[kJ1] + joints[kJ2];
   const auto& arm = cell_.arm;
-  const Eigen::Vector3d flange_W(arm.upper_arm_m * std::cos(joints[kJ1]) + arm.forearm_m * std::cos(forearm_angle),
-                                 arm.upper_arm_m * std::sin(joints[kJ1]) + arm.forearm_m * std::sin(forearm_angle),
-                                 joints[kJ3]);
+  const Eigen::Vector3d flange_W(
+      arm.upper_arm_m * std::cos(joints[kJ1]) + arm.forearm_m * std::cos(forearm_angle),
+      arm.upper_arm_m * std::sin(joints[kJ1]) + arm.forearm_m * std::sin(forearm_angle), joints[kJ3]);
   const double tool_yaw = yaw(joints);
   const Eigen::Vector3d focus_W = flange_W + arm.flange_to_focus_m * beam_W(tool_yaw);
   return tool_pose(table, table.R_WO.transpose() * (focus_W - table.origin_W), tool_yaw);

@@ -3,9 +3,10 @@
 
 #include "planner/cell_model/cell_description.h"
 
-/// Closed-form kinematics of the cell, in the coordinates that planning searches: tilt A, rotation C, and yaw = J1 + J2
-/// + J4. Frames as in cell_description.h. The only singularities are the outer and inner workspace boundary of the
-/// arm, which solve_arm refuses.
+/// Closed-form kinematics of the cell, in the coordinates that planning searches: tilt A, rotation C, and yaw
+/// = J1 + J2
+/// + J4. Frames as in cell_description.h. The only singularities are the outer and inner workspace boundary
+/// of the arm, which solve_arm refuses.
 namespace hilbrush {
 
 /// The table at one (A, C): where the object is.
@@ -47,14 +48,14 @@ class Kinematics {
   ToolPose tool_pose(const Joints& joints) const;
   double yaw(const Joints& joints) const { return joints[kJ1] + joints[kJ2] + joints[kJ4]; }
 
-  /// J1..J4 that bring the focus to `focus_W` at `yaw`; J4 in [-pi, pi]. False if the flange is out of the arm's
-  /// annulus; then `boundary_excess_m` (optional) says by how much. Limits are not checked. Accurate to rounding:
-  /// forward and inverse kinematics together are off by less than 1e-12 m.
+  /// J1..J4 that bring the focus to `focus_W` at `yaw`; J4 in [-pi, pi]. False if the flange is out of the
+  /// arm's annulus; then `boundary_excess_m` (optional) says by how much. Limits are not checked. Accurate to
+  /// rounding: forward and inverse kinematics together are off by less than 1e-12 m.
   bool solve_arm(const Eigen::Vector3d& focus_W, double yaw, Elbow elbow, Joints& joints,
                  double* boundary_excess_m = nullptr) const;
 
-  /// How the joints follow the yaw while the focus stays where it is, rad/rad: J1, J2 and J4; zero for the others.
-  /// Unbounded at the straight arm.
+  /// How the joints follow the yaw while the focus stays where it is, rad/rad: J1, J2 and J4; zero for the
+  /// others. Unbounded at the straight arm.
   Joints per_yaw(const Joints& joints) const;
 
   /// Against the limits with margin; J2 also keeps clear of the straight arm.
@@ -63,8 +64,8 @@ class Kinematics {
   double axis_min(std::size_t axis) const { return min_[axis]; }
   double axis_max(std::size_t axis) const { return max_[axis]; }
 
-  /// `angle` plus the whole turns that bring it nearest to `reference` within the axis's limits. The angle itself if
-  /// none of them is within the limits.
+  /// `angle` plus the whole turns that bring it nearest to `reference` within the axis's limits. The angle
+  /// itself if none of them is within the limits.
   double unwrap_near(std::size_t axis, double angle, double reference) const;
 
   double cos_depression() const { return cos_e_; }

@@ -42,7 +42,8 @@ std::vector<Eigen::Vector3f> ObjectDistance::surface_points(const TexturedMesh& 
     const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
     for (int i = 0; i <= n; ++i)
       for (int j = 0; i + j <= n; ++j)
-        points.push_back((a + ab * (static_cast<double>(i) / n) + ac * (static_cast<double>(j) / n)).cast<float>());
+        points.push_back(
+            (a + ab * (static_cast<double>(i) / n) + ac * (static_cast<double>(j) / n)).cast<float>());
   }
   return points;
 }
@@ -66,12 +67,14 @@ void ObjectDistance::spread(const std::vector<Eigen::Vector3f>& points) {
     nearest[i] = point;
   };
   for (std::uint32_t k = 0; k < points.size(); ++k) {
-    const Eigen::Vector3i corner = ((points[k] - low) / step).array().floor().cast<int>().max(0).min(size_.array() - 2);
-    for (int c = 0; c < 8; ++c) offer(corner.x() + (c & 1), corner.y() + (c >> 1 & 1), corner.z() + (c >> 2), k);
+    const Eigen::Vector3i corner =
+        ((points[k] - low) / step).array().floor().cast<int>().max(0).min(size_.array() - 2);
+    for (int c = 0; c < 8; ++c)
+      offer(corner.x() + (c & 1), corner.y() + (c >> 1 & 1), corner.z() + (c >> 2), k);
   }
 
-  // Each slab takes points from the one before it, then passes them on within itself: rows and columns, each in both
-  // directions.
+  // Each slab takes points from the one before it, then passes them on within itself: rows and columns, each
+  // in both directions.
   const auto take_from = [&](int x, int y, int z, const std::array<int, 3>& step_to) {
     const int nx = x + step_to[0];
     const int ny = y + step_to[1];

@@ -51,14 +51,15 @@ void set_ray(RTCRay& ray, const Eigen::Vector3d& from_O, const Eigen::Vector3d& 
 ObjectRays::ObjectRays(const TexturedMesh& mesh) : scene_(std::make_unique<Scene>()) {
   rtcSetSceneFlags(scene_->scene, RTC_SCENE_FLAG_ROBUST);
   RTCGeometry geometry = rtcNewGeometry(scene_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), mesh.vertices.size()));
-  auto* triangles = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                   3 * sizeof(unsigned), mesh.triangle_count()));
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.vertices.size()));
+  auto* triangles = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), mesh.triangle_count()));
   CHECK(mesh.triangle_count() == 0 || (vertices != nullptr && triangles != nullptr));
   for (const auto& p : mesh.vertices)
     for (int i = 0; i < 3; ++i) *vertices++ = static_cast<float>(p[i]);
-  for (const auto& triangle : mesh.triangles) triangles = std::copy(triangle.begin(), triangle.end(), triangles);
+  for (const auto& triangle : mesh.triangles)
+    triangles = std::copy(triangle.begin(), triangle.end(), triangles);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_->scene, geometry);
   rtcReleaseGeometry(geometry);
@@ -68,8 +69,8 @@ ObjectRays::ObjectRays(const TexturedMesh& mesh) : scene_(std::make_unique<Scene
 ObjectRays::~ObjectRays() = default;
 ObjectRays::ObjectRays(ObjectRays&&) noexcept = default;
 
-double ObjectRays::free_length_m(const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O, double near_m,
-                                 double far_m) const {
+double ObjectRays::free_length_m(const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O,
+                                 double near_m, double far_m) const {
   RTCRayHit ray;
   set_ray(ray.ray, from_O, direction_O, near_m, far_m);
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -91,8 +92,8 @@ bool ObjectRays::is_blocked(const Eigen::Vector3d& from_O, const Eigen::Vector3d
 }
 
 bool ObjectRays::is_beam_blocked(const Eigen::Vector3d& from_O, const Eigen::Vector3d& direction_O,
-                                 const std::array<Eigen::Vector3d, 3>& aside_O, double near_m, double side_near_m,
-                                 double far_m) const {
+                                 const std::array<Eigen::Vector3d, 3>& aside_O, double near_m,
+                                 double side_near_m, double far_m) const {
   alignas(16) RTCRay4 rays;
   alignas(16) const int valid[4] = {-1, -1, -1, -1};
   const Eigen::Vector3f direction = direction_O.cast<float>();

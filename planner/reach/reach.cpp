@@ -27,18 +27,20 @@ std::vector<Eigen::Vector3d> rings(double max_angle, int ring_count, double spac
   std::vector<Eigen::Vector3d> directions{Eigen::Vector3d::UnitZ()};
   for (int ring = 1; ring <= ring_count; ++ring) {
     const double angle = max_angle * ring / ring_count;
-    const int count = std::max(4, static_cast<int>(std::ceil(2 * std::numbers::pi * std::sin(angle) / spacing)));
+    const int count =
+        std::max(4, static_cast<int>(std::ceil(2 * std::numbers::pi * std::sin(angle) / spacing)));
     for (int i = 0; i < count; ++i) {
       const double turn = 2 * std::numbers::pi * (i + .5 * (ring & 1)) / count;
-      directions.emplace_back(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn), std::cos(angle));
+      directions.emplace_back(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn),
+                              std::cos(angle));
     }
   }
   return directions;
 }
 
-/// By how much the tilt would have to exceed its limits to bring the beam to this direction in O; not above zero if
-/// solve_table finds a tilt. In W the beam is at 90 degrees + depression from the vertical, so the table's axis has to
-/// be tilted at least by what the beam's angle with that axis differs from it.
+/// By how much the tilt would have to exceed its limits to bring the beam to this direction in O; not above
+/// zero if solve_table finds a tilt. In W the beam is at 90 degrees + depression from the vertical, so the
+/// table's axis has to be tilted at least by what the beam's angle with that axis differs from it.
 double tilt_excess(const Kinematics& kinematics, const Eigen::Vector3d& beam_O) {
   const double from_axis = std::acos(std::clamp(beam_O.z(), -1., 1.));
   const double from_vertical = std::atan2(kinematics.cos_depression(), -kinematics.sin_depression());
@@ -53,7 +55,8 @@ TableSolutions solve_table(const Kinematics& kinematics, double tilt, const Eige
   const double se = kinematics.sin_depression();
   const double ca = std::cos(tilt);
   const double sa = std::sin(tilt);
-  if (std::abs(sa * ce) < 1e-4) return {};  // A = 0: C is parallel to yaw, no yaw changes the height of the beam
+  if (std::abs(sa * ce) < 1e-4)
+    return {};  // A = 0: C is parallel to yaw, no yaw changes the height of the beam
   const double cos_yaw = -(beam_O.z() + ca * se) / (sa * ce);
   if (std::abs(cos_yaw) > 1) return {};
   const double azimuth_O = std::atan2(beam_O.y(), beam_O.x());
@@ -110,8 +113,8 @@ std::optional<DotPose> Reach::pose_for_beam(const Target& target, const Eigen::V
   for (const double tilt : tilts) {
     for (const TableSolution& solution : solve_table(kinematics_, tilt, beam_O)) {
       has_tilt = true;
-      const TablePose table =
-          kinematics_.table_pose(tilt, kinematics_.unwrap_near(kRotation, solution.rotation, reference[kRotation]));
+      const TablePose table = kinematics_.table_pose(
+          tilt, kinematics_.unwrap_near(kRotation, solution.rotation, reference[kRotation]));
       for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
         const auto joints = arm_joints(table, target.position_O, solution.yaw, elbow, reference, tally);
         if (!joints) continue;
@@ -137,9 +140,9 @@ bool Reach::can_hit(const Target& target, const Eigen::Vector3d& beam_O) const {
          pose_for_beam(target, beam_O, fine_tilts_, anywhere, nullptr);
 }
 
-std::optional<DotPose> Reach::search_cone(const Target& target, const Eigen::Vector3d& axis_O, const Directions& cone,
-                                          const std::vector<double>& tilts, const Joints& reference,
-                                          FailureTally* tally) const {
+std::optional<DotPose> Reach::search_cone(const Target& target, const Eigen::Vector3d& axis_O,
+                                          const Directions& cone, const std::vector<double>& tilts,
+                                          const Joints& reference, FailureTally* tally) const {
   const Eigen::Vector3d u = axis_O.unitOrthogonal();
   const Eigen::Vector3d v = axis_O.cross(u);
   for (const Eigen::Vector3d& direction : cone) {
@@ -170,8 +173,8 @@ std::optional<DotPose> Reach::find_pose_quickly(const Target& target, const Join
 
 PoseSearchResult Reach::find_pose(const Target& target, const Joints& reference) const {
   if (auto pose = find_pose_quickly(target, reference)) return {std::move(pose), {}};
-  // The second, finer search also finds the reason. A third one is for windows that are narrower still, and only where
-  // the best failure is a near miss.
+  // The second, finer search also finds the reason. A third one is for windows that are narrower still, and
+  // only where the best failure is a near miss.
   FailureTally tally;
   auto pose = search_cone(target, target.face_normal_O, fine_cone_, tilts_, reference, &tally);
   if (!pose && tally.is_nearly_reached())

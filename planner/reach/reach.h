@@ -49,13 +49,13 @@ class Reach {
   /// Whether some pose within the cone exposes the point.
   bool is_reachable(const Eigen::Vector3d& position_O, const Eigen::Vector3d& normal_O) const;
 
-  /// Some pose within the cone around the face normal, as near to the smooth normal as a set of directions allows:
-  /// first a coarse set, then a finer one with finer tilts. Depends on nothing but the target and, for windings, the
-  /// reference.
+  /// Some pose within the cone around the face normal, as near to the smooth normal as a set of directions
+  /// allows: first a coarse set, then a finer one with finer tilts. Depends on nothing but the target and,
+  /// for windings, the reference.
   PoseSearchResult find_pose(const Target& target, const Joints& reference) const;
 
-  /// The first, coarse search alone: fast also where there is nothing to find, and sometimes without success where the
-  /// finer one finds a pose.
+  /// The first, coarse search alone: fast also where there is nothing to find, and sometimes without success
+  /// where the finer one finds a pose.
   std::optional<DotPose> find_pose_quickly(const Target& target, const Joints& reference) const;
 
   /// Whether the beam meets the target within the cone around its face normal, and beam and lens are clear.
@@ -63,10 +63,10 @@ class Reach {
   /// ... and some pose of table and arm brings it there.
   bool can_hit(const Target& target, const Eigen::Vector3d& beam_O) const;
 
-  /// The joints that expose a dot on a table that is already chosen: within their limits, quill and links clear; the
-  /// lens is not checked. `tally` (optional) is given the reason if there are none.
-  std::optional<Joints> arm_joints(const TablePose& table, const Eigen::Vector3d& position_O, double yaw, Elbow elbow,
-                                   const Joints& reference, FailureTally* tally = nullptr) const;
+  /// The joints that expose a dot on a table that is already chosen: within their limits, quill and links
+  /// clear; the lens is not checked. `tally` (optional) is given the reason if there are none.
+  std::optional<Joints> arm_joints(const TablePose& table, const Eigen::Vector3d& position_O, double yaw,
+                                   Elbow elbow, const Joints& reference, FailureTally* tally = nullptr) const;
 
   const std::vector<double>& tilts() const { return tilts_; }
   /// The cone's limit against the face normal, a little inside the limit of the options.
@@ -74,11 +74,11 @@ class Reach {
 
  private:
   using Directions = std::vector<Eigen::Vector3d>;  ///< unit, around +z, nearest first
-  std::optional<DotPose> search_cone(const Target& target, const Eigen::Vector3d& axis_O, const Directions& cone,
-                                     const std::vector<double>& tilts, const Joints& reference,
-                                     FailureTally* tally) const;
-  /// The pose that brings this beam to the dot, if table, arm and quill allow one; the beam and the lens were found
-  /// clear before.
+  std::optional<DotPose> search_cone(const Target& target, const Eigen::Vector3d& axis_O,
+                                     const Directions& cone, const std::vector<double>& tilts,
+                                     const Joints& reference, FailureTally* tally) const;
+  /// The pose that brings this beam to the dot, if table, arm and quill allow one; the beam and the lens were
+  /// found clear before.
   std::optional<DotPose> pose_for_beam(const Target& target, const Eigen::Vector3d& beam_O,
                                        const std::vector<double>& tilts, const Joints& reference,
                                        FailureTally* tally) const;

@@ -112,8 +112,8 @@ void FailureTally::limit(const LimitExcess& excess) {
 }
 
 bool FailureTally::is_nearly_reached() const {
-  // The steps of the second search are 5 degrees of direction and 7.5 of tilt: half of that turns the object, within .2
-  // m of the axis, by less than this.
+  // The steps of the second search are 5 degrees of direction and 7.5 of tilt: half of that turns the object,
+  // within .2 m of the axis, by less than this.
   constexpr double kLengthM = .02, kAngle = 12 * kDegree;
   // A window that was missed is narrow; a beam that is blocked near the dot is far from any.
   constexpr double kDeepM = .01;
@@ -137,8 +137,12 @@ SkippedDot FailureTally::describe() const {
   if (stage_ == kTable) return past_limit(SkipReason::kIncidence, kTilt);
   if (stage_ == kLimit) {
     if (axis_ != kAxisCount) return past_limit(SkipReason::kJointLimit, axis_);
-    return {0,       SkipReason::kJointLimit,   shortfall_mm(amount_) + " " + std::string(kOutOfReach), kOutOfReach,
-            amount_, SkipMeasure::kExcessLength};
+    return {0,
+            SkipReason::kJointLimit,
+            shortfall_mm(amount_) + " " + std::string(kOutOfReach),
+            kOutOfReach,
+            amount_,
+            SkipMeasure::kExcessLength};
   }
   const Cause cause = cause_of(what_);
   SkippedDot skipped{0, cause.reason, cause.what, cause.what, amount_, SkipMeasure::kExcessLength};

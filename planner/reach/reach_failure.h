@@ -2,8 +2,8 @@
 #include "planner/reach/clearance.h"
 #include "planner/reach/skipped_dot.h"
 
-/// Why a dot is out of reach: of all candidate poses, the failure of the one that passed the most checks, with the
-/// amount.
+/// Why a dot is out of reach: of all candidate poses, the failure of the one that passed the most checks,
+/// with the amount.
 namespace hilbrush {
 
 class FailureTally {
@@ -25,8 +25,8 @@ class FailureTally {
  private:
   /// The checks in their order.
   enum Stage { kNone, kBeam, kLens, kTable, kLimit, kQuill, kLinks };
-  /// Whether this failure replaces the one that is kept: it is of a later check, or of the same one with a smaller
-  /// shortfall. Then it does.
+  /// Whether this failure replaces the one that is kept: it is of a later check, or of the same one with a
+  /// smaller shortfall. Then it does.
   bool replaces(Stage stage, double shortfall);
   void body(Stage stage, const Shortfall& shortfall);
   SkippedDot past_limit(SkipReason reason, std::size_t axis) const;

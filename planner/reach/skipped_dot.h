@@ -18,7 +18,8 @@ enum class SkipReason : std::uint8_t {
   kNoPath       ///< there are poses, but no clear path to one
 };
 inline constexpr int kSkipReasonCount = 8;
-/// As reports name it: "occluded", "incidence", "joint_limit", "lens_object", "lens_table", "energy", "arm", "no_way".
+/// As reports name it: "occluded", "incidence", "joint_limit", "lens_object", "lens_table", "energy", "arm",
+/// "no_way".
 const char* skip_reason_name(SkipReason reason);
 
 /// What SkippedDot::amount measures.
@@ -32,9 +33,10 @@ enum class SkipMeasure : std::uint8_t {
 struct SkippedDot {
   std::uint32_t dot_index = 0;
   SkipReason reason = SkipReason::kOccluded;
-  std::string detail;          ///< a sentence with the amount, where there is one
-  std::string_view what = {};  ///< the same without the amount, so that dots can be counted by it; of static storage
-  double amount = 0;           ///< the amount in the sentence, rad or m
+  std::string detail;  ///< a sentence with the amount, where there is one
+  std::string_view what =
+      {};             ///< the same without the amount, so that dots can be counted by it; of static storage
+  double amount = 0;  ///< the amount in the sentence, rad or m
   SkipMeasure measure = SkipMeasure::kNone;
 };
 

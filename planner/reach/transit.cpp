@@ -13,8 +13,8 @@ namespace {
 constexpr double kMinSlackM = .5e-3;
 /// ... unless it starts nearer, because it was stopped there: it may leave such a pose.
 constexpr double kMinSlackOfEscapeM = .05e-3;
-/// The share of that distance which it keeps for certain in between. The program check wants .3 mm around the lens, and
-/// looks at a lens that is longer and wider by as much: .42 mm at its rim.
+/// The share of that distance which it keeps for certain in between. The program check wants .3 mm around the
+/// lens, and looks at a lens that is longer and wider by as much: .42 mm at its rim.
 constexpr double kKeptShare = .86;
 /// Looks at one leg under one law; those that need more pass something closely over a long distance.
 constexpr int kMaxLooks = 3000;
@@ -37,8 +37,8 @@ double Transit::arm_travel_bound_m(const Joints& a, const Joints& b, bool is_one
   const auto& arm = reach_.cell().arm;
   const auto& lens = reach_.cell().lens;
   // From the flange's axis to the farthest point of lens or quill, horizontally.
-  const double lens_m =
-      std::hypot(std::max(lens.far_m - arm.flange_to_focus_m, arm.flange_to_focus_m - lens.near_m), lens.radius_m);
+  const double lens_m = std::hypot(
+      std::max(lens.far_m - arm.flange_to_focus_m, arm.flange_to_focus_m - lens.near_m), lens.radius_m);
   const double tool_m = std::max(lens_m, arm.quill_radius_m);
   const auto moved = [&](std::size_t axis) { return std::abs(b[axis] - a[axis]); };
   // Along the arm the flange is farthest from J1 at the straighter of the two ends.
@@ -49,7 +49,8 @@ double Transit::arm_travel_bound_m(const Joints& a, const Joints& b, bool is_one
   // Yaws that cancel do not add up, whichever of them comes first.
   double left = 0;
   double right = 0;
-  for (const std::size_t axis : {kJ1, kJ2, kJ4}) (b[axis] > a[axis] ? left : right) += std::abs(b[axis] - a[axis]);
+  for (const std::size_t axis : {kJ1, kJ2, kJ4})
+    (b[axis] > a[axis] ? left : right) += std::abs(b[axis] - a[axis]);
   const double yaw_change = is_one_law ? std::max(left, right) : left + right;
   // With the arm folded the elbow is the farthest point of the links.
   return moved(kJ1) * std::max(flange_m, l1) + moved(kJ2) * l2 + yaw_change * tool_m + moved(kJ3);
@@ -69,8 +70,8 @@ bool Transit::is_clear_at(const Joints& joints) const {
   return slack_m(joints) >= kMinSlackM;
 }
 
-/// One leg with one law for each chain. Boxes of time and lag cover all that can happen: in each, nothing moves farther
-/// from the middle than the clearance there, less what is to be kept.
+/// One leg with one law for each chain. Boxes of time and lag cover all that can happen: in each, nothing
+/// moves farther from the middle than the clearance there, less what is to be kept.
 class Transit::Leg {
  public:
   struct Law {
@@ -102,7 +103,8 @@ class Transit::Leg {
     if (slack_m < limits_.refused_m) return false;
     const Joints low = joints_at(box.begin_s, box.lag_high_s);
     const Joints high = joints_at(box.end_s, box.lag_low_s);
-    const double arm_m = std::max(transit_.arm_travel_bound_m(low, middle), transit_.arm_travel_bound_m(middle, high));
+    const double arm_m =
+        std::max(transit_.arm_travel_bound_m(low, middle), transit_.arm_travel_bound_m(middle, high));
     const double table_m =
         std::max(transit_.table_travel_bound_m(low, middle), transit_.table_travel_bound_m(middle, high));
     if (arm_m + table_m <= slack_m - limits_.kept_m) return true;
@@ -114,8 +116,10 @@ class Transit::Leg {
   }
   Joints joints_at(double time_s, double lag_s) const {
     Joints joints = to_;
-    put_chain(cell_, kRobotChain, law_.robot, from_, to_, law_.is_table_late ? time_s : time_s - lag_s, joints);
-    put_chain(cell_, kTableChain, law_.table, from_, to_, law_.is_table_late ? time_s - lag_s : time_s, joints);
+    put_chain(cell_, kRobotChain, law_.robot, from_, to_, law_.is_table_late ? time_s : time_s - lag_s,
+              joints);
+    put_chain(cell_, kTableChain, law_.table, from_, to_, law_.is_table_late ? time_s - lag_s : time_s,
+              joints);
     return joints;
   }
 
@@ -131,16 +135,19 @@ class Transit::Leg {
 namespace {
 
 /// The laws that a chain may follow; one is enough where they are the same.
-std::vector<Interpolation> laws_of(Interpolation interpolation, Chain chain, const Joints& from, const Joints& to) {
+std::vector<Interpolation> laws_of(Interpolation interpolation, Chain chain, const Joints& from,
+                                   const Joints& to) {
   int moving = 0;
   for (std::size_t i = chain.first; i < chain.first + chain.count; ++i) moving += to[i] != from[i];
   if (moving < 2) return {Interpolation::kIndependent};
-  if (interpolation == Interpolation::kUnknown) return {Interpolation::kIndependent, Interpolation::kCoordinated};
+  if (interpolation == Interpolation::kUnknown)
+    return {Interpolation::kIndependent, Interpolation::kCoordinated};
   return {interpolation};
 }
 
 bool moves(Chain chain, const Joints& from, const Joints& to) {
-  return !std::equal(from.begin() + chain.first, from.begin() + chain.first + chain.count, to.begin() + chain.first);
+  return !std::equal(from.begin() + chain.first, from.begin() + chain.first + chain.count,
+                     to.begin() + chain.first);
 }
 
 }  // namespace
@@ -149,18 +156,22 @@ bool Transit::is_clear(const Joints& from, const Joints& to) const {
   const double slack_from_m = slack_m(from);
   const Limits limits = limits_from(slack_from_m);
   if (slack_m(to) < kMinSlackM) return false;
-  if (arm_travel_bound_m(from, to) + table_travel_bound_m(from, to) <= slack_from_m - limits.kept_m) return true;
+  if (arm_travel_bound_m(from, to) + table_travel_bound_m(from, to) <= slack_from_m - limits.kept_m)
+    return true;
   // The same around the middle, from which each joint has half of its move to either side, whatever the law.
   Joints middle;
   for (std::size_t i = 0; i < kAxisCount; ++i) middle[i] = .5 * (from[i] + to[i]);
-  if (.5 * (arm_travel_bound_m(from, to, false) + table_travel_bound_m(from, to)) <= slack_m(middle) - limits.kept_m)
+  if (.5 * (arm_travel_bound_m(from, to, false) + table_travel_bound_m(from, to)) <=
+      slack_m(middle) - limits.kept_m)
     return true;
   const auto& motion = reach_.cell().motion;
   const bool has_lag = motion.start_lag_s > 0 && moves(kRobotChain, from, to) && moves(kTableChain, from, to);
   for (const Interpolation robot : laws_of(motion.robot, kRobotChain, from, to))
     for (const Interpolation table : laws_of(motion.table, kTableChain, from, to)) {
-      if (!Leg(*this, from, to, limits, {robot, table, false}).is_clear(has_lag ? motion.start_lag_s : 0)) return false;
-      if (has_lag && !Leg(*this, from, to, limits, {robot, table, true}).is_clear(motion.start_lag_s)) return false;
+      if (!Leg(*this, from, to, limits, {robot, table, false}).is_clear(has_lag ? motion.start_lag_s : 0))
+        return false;
+      if (has_lag && !Leg(*this, from, to, limits, {robot, table, true}).is_clear(motion.start_lag_s))
+        return false;
     }
   return true;
 }
@@ -210,7 +221,8 @@ std::optional<std::vector<Joints>> Transit::route(const Joints& from, const Join
     // The arm goes home, the table turns, the arm comes back.
     Joints before = out->back();
     Joints after = in->back();
-    for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4}) before[axis] = after[axis] = reach_.cell().axes[axis].home;
+    for (const std::size_t axis : {kJ1, kJ2, kJ3, kJ4})
+      before[axis] = after[axis] = reach_.cell().axes[axis].home;
     if (!are_clear({out->back(), before, after, in->back()})) return std::nullopt;
     path.push_back(before);
     path.push_back(after);
@@ -226,7 +238,8 @@ std::optional<std::vector<Joints>> Transit::retreat(const Joints& pose, bool is_
     if (!is_outwards) std::reverse(path.begin(), path.end());
     return are_clear(path);
   };
-  // In one move; or in steps, because the axes do not arrive together, and shorter steps deviate less from the beam.
+  // In one move; or in steps, because the axes do not arrive together, and shorter steps deviate less from
+  // the beam.
   std::vector<Joints> steps;
   for (const double back_m : kBackOffsM) {
     const auto back = backed_off(pose, back_m);

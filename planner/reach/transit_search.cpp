@@ -7,9 +7,9 @@
 #include "planner/cell_model/time_model.h"
 #include "planner/reach/transit.h"
 
-/// The last resort of Transit: RRT-connect (Kuffner and LaValle 2000) in the six joints. What differs: edges are whole
-/// moves, each checked as the axes will really run it, which differs between the two directions; and samples are drawn
-/// near the two ends too, where the tool may have to leave a narrow place.
+/// The last resort of Transit: RRT-connect (Kuffner and LaValle 2000) in the six joints. What differs: edges
+/// are whole moves, each checked as the axes will really run it, which differs between the two directions;
+/// and samples are drawn near the two ends too, where the tool may have to leave a narrow place.
 namespace hilbrush {
 namespace {
 
@@ -43,7 +43,9 @@ class Sampler {
   }
 
  private:
-  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+  double uniform(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
   Joints limited(Joints joints) const {
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       joints[axis] = std::clamp(joints[axis], kinematics_.axis_min(axis), kinematics_.axis_max(axis));
@@ -75,7 +77,8 @@ class Sampler {
 };
 
 /// The nodes of the tree that take the least time to reach, nearest first.
-std::vector<int> nearest(const CellDescription& cell, const Tree& tree, const Joints& joints, std::size_t count) {
+std::vector<int> nearest(const CellDescription& cell, const Tree& tree, const Joints& joints,
+                         std::size_t count) {
   std::vector<std::pair<double, int>> by_time;
   for (std::size_t i = 0; i < tree.size(); ++i)
     by_time.emplace_back(move_s(cell, tree[i].joints, joints), static_cast<int>(i));
@@ -100,7 +103,8 @@ std::vector<Joints> Transit::shortened(std::vector<Joints> path) const {
     for (std::size_t j = path.size() - 1; j > i + 1; --j) {
       if ((i == 0 || j + 1 == path.size()) && needs_retract(path[i], path[j])) continue;
       if (!is_clear(path[i], path[j])) continue;
-      path.erase(path.begin() + static_cast<std::ptrdiff_t>(i) + 1, path.begin() + static_cast<std::ptrdiff_t>(j));
+      path.erase(path.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                 path.begin() + static_cast<std::ptrdiff_t>(j));
       break;
     }
   return path;
@@ -134,7 +138,8 @@ std::optional<std::vector<Joints>> Transit::search(const Joints& from, const Joi
     tree.push_back({*grown, parent});
     for (const int there : nearest(reach_.cell(), other, *grown, kMaxJoins)) {
       const Joints& meeting = other[static_cast<std::size_t>(there)].joints;
-      if (side == 0 ? !is_passable(*grown, meeting, there == 0) : !is_passable(meeting, *grown, there == 0)) continue;
+      if (side == 0 ? !is_passable(*grown, meeting, there == 0) : !is_passable(meeting, *grown, there == 0))
+        continue;
       std::vector<Joints> path;
       for (int i = side == 0 ? index : there; i >= 0; i = trees[0][static_cast<std::size_t>(i)].parent)
         path.push_back(trees[0][static_cast<std::size_t>(i)].joints);

@@ -2,14 +2,15 @@
 #include <sstream>
 #include <string>
 
-/// Broken invariants. CHECK is always on; its handler is called with the message and must not return (the daemon's
-/// turns the beam off first). What a file, a setting or a request can cause is an InputError instead, see
-/// input_error.h.
+/// Broken invariants. CHECK is always on; its handler is called with the message and must not return (the
+/// daemon's turns the beam off first). What a file, a setting or a request can cause is an InputError
+/// instead, see input_error.h.
 namespace hilbrush {
 
 using CheckHandler = void (*)(const std::string& message);
 
-/// Replaces the handler (default: print to stderr and abort). Returns the previous one. Call before threads start.
+/// Replaces the handler (default: print to stderr and abort). Returns the previous one. Call before threads
+/// start.
 CheckHandler set_check_handler(CheckHandler handler);
 
 [[noreturn]] void check_failed(const char* file, int line, const std::string& message);

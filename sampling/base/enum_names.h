@@ -5,8 +5,8 @@
 
 #include "sampling/base/check.h"
 
-/// The names of an enum's values in files, messages and reports. A table stands beside its enum and names each value
-/// itself: the order of the enumerators means nothing, that of the table is the order in messages.
+/// The names of an enum's values in files, messages and reports. A table stands beside its enum and names
+/// each value itself: the order of the enumerators means nothing, that of the table is the order in messages.
 namespace hilbrush {
 
 template <class Enum>
@@ -19,7 +19,8 @@ template <class Enum, std::size_t kCount>
 const char* name_of(const EnumName<Enum> (&names)[kCount], Enum value) {
   for (const EnumName<Enum>& entry : names)
     if (entry.value == value) return entry.name;
-  check_failed(__FILE__, __LINE__, "an enumerator without a name: " + std::to_string(static_cast<int>(value)));
+  check_failed(__FILE__, __LINE__,
+               "an enumerator without a name: " + std::to_string(static_cast<int>(value)));
 }
 
 /// All names, in the order of the table.

@@ -4,8 +4,8 @@
 
 namespace hilbrush {
 
-/// A right-handed orthonormal frame whose third column is the unit vector z (Duff et al., "Building an Orthonormal
-/// Basis, Revisited", 2017).
+/// A right-handed orthonormal frame whose third column is the unit vector z (Duff et al., "Building an
+/// Orthonormal Basis, Revisited", 2017).
 inline Eigen::Matrix3d frame_about(const Eigen::Vector3d& z) {
   const double sign = std::copysign(1., z.z());
   const double a = -1 / (sign + z.z());

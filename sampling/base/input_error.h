@@ -11,7 +11,9 @@ namespace hilbrush {
 class InputError : public std::runtime_error {
  public:
   InputError(std::string at, const std::string& sentence)
-      : std::runtime_error(at.empty() ? sentence : at + ": " + sentence), at_(std::move(at)), sentence_(sentence) {}
+      : std::runtime_error(at.empty() ? sentence : at + ": " + sentence),
+        at_(std::move(at)),
+        sentence_(sentence) {}
   const std::string& at() const { return at_; }
   const std::string& sentence() const { return sentence_; }
 

@@ -7,8 +7,9 @@
 
 namespace hilbrush {
 
-/// Reports how far a stage has come: fractions from 0 to 1, from the thread that runs the stage, at least once a second
-/// of work. The listener may throw to end the stage. A default Progress has no listener: calling it does nothing.
+/// Reports how far a stage has come: fractions from 0 to 1, from the thread that runs the stage, at least
+/// once a second of work. The listener may throw to end the stage. A default Progress has no listener:
+/// calling it does nothing.
 class Progress {
  public:
   Progress() = default;

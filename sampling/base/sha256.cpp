@@ -23,13 +23,15 @@ constexpr std::array<std::uint32_t, 64> kRoundConstants{
 constexpr std::size_t kBlockBytes = 64;
 
 std::uint32_t big_endian_word(const std::uint8_t* bytes) {
-  return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 | std::uint32_t{bytes[2]} << 8 | bytes[3];
+  return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 | std::uint32_t{bytes[2]} << 8 |
+         bytes[3];
 }
 
 }  // namespace
 
 Sha256::Sha256()
-    : state_{0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a, 0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19} {}
+    : state_{0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a, 0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19} {
+}
 
 void Sha256::update(std::span<const std::uint8_t> bytes) {
   std::size_t filled = byte_count_ % kBlockBytes;
@@ -65,7 +67,8 @@ std::string Sha256::hex_digest() {
   const std::size_t filled = byte_count_ % kBlockBytes;
   std::array<std::uint8_t, 2 * kBlockBytes> tail{0x80};
   const std::size_t padding = (filled < 56 ? 56 : 120) - filled;
-  for (std::size_t i = 0; i < 8; ++i) tail[padding + i] = static_cast<std::uint8_t>(bit_count >> (56 - 8 * i));
+  for (std::size_t i = 0; i < 8; ++i)
+    tail[padding + i] = static_cast<std::uint8_t>(bit_count >> (56 - 8 * i));
   update(std::span(tail.data(), padding + 8));
 
   static constexpr char kDigits[] = "0123456789abcdef";

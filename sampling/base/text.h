@@ -14,11 +14,12 @@ std::string_view trimmed(std::string_view text);
 /// ASCII letters only.
 std::string lower_case(std::string_view text);
 
-/// The shortest text of `value` rounded to `digits` significant digits, as printf's %g writes it: "0.25", "1e-05",
-/// "inf".
+/// The shortest text of `value` rounded to `digits` significant digits, as printf's %g writes it: "0.25",
+/// "1e-05", "inf".
 std::string number(double value, int digits = 6);
 
-/// An amount for a message: at least two significant digits, and every digit before the point: "0.25", "1.5", "1234".
+/// An amount for a message: at least two significant digits, and every digit before the point: "0.25", "1.5",
+/// "1234".
 std::string amount(double value);
 
 }  // namespace hilbrush

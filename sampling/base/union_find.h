@@ -7,8 +7,8 @@
 
 namespace hilbrush {
 
-/// Disjoint sets of the numbers 0 to n - 1, with path halving. The smallest number of a set is its root, so the roots
-/// do not depend on the order in which sets were united. Cost: O(log n) a call, amortized.
+/// Disjoint sets of the numbers 0 to n - 1, with path halving. The smallest number of a set is its root, so
+/// the roots do not depend on the order in which sets were united. Cost: O(log n) a call, amortized.
 class UnionFind {
  public:
   explicit UnionFind(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }

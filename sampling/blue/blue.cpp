@@ -23,29 +23,31 @@ using Eigen::Vector3d;
 
 constexpr int kChoiceSweeps = 3;
 constexpr int kNewtonSweeps = 3;
-/// At the end two dots are pushed apart if they are nearer than this share of their distance in the densest packing.
-/// The kernel, which is flat on top, leaves a few such pairs in 100,000.
+/// At the end two dots are pushed apart if they are nearer than this share of their distance in the densest
+/// packing. The kernel, which is flat on top, leaves a few such pairs in 100,000.
 constexpr double kMinDistance = .58;
-/// In spacings. A place that is farther from all dots attracts the dot of its stratum. Most such holes lie on the
-/// border of the surface: there no neighbor on the other side pushes the dots back.
+/// In spacings. A place that is farther from all dots attracts the dot of its stratum. Most such holes lie on
+/// the border of the surface: there no neighbor on the other side pushes the dots back.
 constexpr double kMaxDistance = .78;
 constexpr int kEveningRounds = 3;
-/// A dot that moves away from one neighbor may come too near to another, so the last sweeps only push dots apart.
+/// A dot that moves away from one neighbor may come too near to another, so the last sweeps only push dots
+/// apart.
 constexpr int kLastPushes = 3;
 constexpr int kSweeps = kChoiceSweeps + kNewtonSweeps + 2 * kEveningRounds + kLastPushes;
 /// In spacings of a place: border that is farther away is not looked for.
 constexpr double kToBorder = .4;
-/// In spacings: how far all Newton steps together may move a dot from the place that was chosen, and a single one.
+/// In spacings: how far all Newton steps together may move a dot from the place that was chosen, and a single
+/// one.
 constexpr double kMaxOffset = .25;
 constexpr double kMaxStep = .15;
-/// Dots whose spacings differ by a larger factor do not push each other: the pull of the surface around them would undo
-/// it.
+/// Dots whose spacings differ by a larger factor do not push each other: the pull of the surface around them
+/// would undo it.
 constexpr double kMaxUnequal = 4;
 /// Distance of neighbors in the densest packing, at unit area a dot: sqrt(2 / sqrt(3)).
 constexpr double kDensestSpacing = 1.0745699318235418;
 
-/// The largest reach of one dot: two dots push each other only if the distance of their strata is less than the sum of
-/// their reaches.
+/// The largest reach of one dot: two dots push each other only if the distance of their strata is less than
+/// the sum of their reaches.
 double reach_of(const PlacedStratum& stratum) {
   // The kernel of two dots that are as unequal as may be reaches furthest beyond the sum of equal ones.
   static const double kMaxReach =
@@ -53,8 +55,8 @@ double reach_of(const PlacedStratum& stratum) {
   return stratum.radius_m + kMaxReach * stratum.spacing_m;
 }
 
-/// Strata whose dots push each other: those that face the same way or are connected over a fold, not those on two sides
-/// of a wall.
+/// Strata whose dots push each other: those that face the same way or are connected over a fold, not those on
+/// two sides of a wall.
 IndexLists neighboring_strata(const SurfaceCurve& curve, const PlacedStrata& strata) {
   std::vector<SizedBall> balls;
   balls.reserve(strata.strata.size());
@@ -68,8 +70,8 @@ IndexLists neighboring_strata(const SurfaceCurve& curve, const PlacedStrata& str
     const PlacedStratum &a = strata.strata[i], &b = strata.strata[j];
     const double ratio = a.spacing_m / b.spacing_m;
     if (!(ratio < kMaxUnequal && ratio * kMaxUnequal > 1)) return false;
-    const double reach =
-        static_cast<double>(std::sqrt(PairKernel(a.spacing_m, b.spacing_m).support2)) + a.radius_m + b.radius_m;
+    const double reach = static_cast<double>(std::sqrt(PairKernel(a.spacing_m, b.spacing_m).support2)) +
+                         a.radius_m + b.radius_m;
     if (!((a.middle_O - b.middle_O).squaredNorm() < reach * reach)) return false;
     if (a.normal_O.dot(b.normal_O) > 0) return true;
     const SurfacePlace& from = first_place(std::min(i, j));
@@ -112,7 +114,8 @@ class Relaxation {
   void even_out(const Progress& progress) {
     for (int round = 0; round < kEveningRounds; ++round) {
       visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round, [&](std::size_t i) { close_hole(i); });
-      visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round + 1, [&](std::size_t i) { leave_nearest(i); });
+      visit_all(progress, kChoiceSweeps + kNewtonSweeps + 2 * round + 1,
+                [&](std::size_t i) { leave_nearest(i); });
     }
     for (int sweep = kSweeps - kLastPushes; sweep < kSweeps; ++sweep)
       visit_all(progress, sweep, [&](std::size_t i) { leave_nearest(i); });
@@ -201,10 +204,13 @@ class Relaxation {
     move_to(dots_[i], curve_.surface(), tone_, home_O + from_home);
   }
 
-  /// Places on the border beside each stratum, where walks outwards and to both sides from its open places end.
+  /// Places on the border beside each stratum, where walks outwards and to both sides from its open places
+  /// end.
   void find_border() {
     const Surface& surface = curve_.surface();
-    const auto has_border = [](const auto& sides) { return std::ranges::find(sides, kNoSide) != sides.end(); };
+    const auto has_border = [](const auto& sides) {
+      return std::ranges::find(sides, kNoSide) != sides.end();
+    };
     border_.resize(dots_.size());
     if (std::ranges::none_of(surface.neighbors, has_border)) return;
     tbb::parallel_for(std::size_t{0}, dots_.size(), [&](std::size_t i) {
@@ -215,17 +221,18 @@ class Relaxation {
         const Vector3d outwards = (place.position_O - stratum.middle_O).normalized();
         const Vector3d across = stratum.normal_O.cross(outwards);
         for (const Vector3d& way : {outwards, across, Vector3d(-across)}) {
-          const SurfacePoint end =
-              walk_towards(surface, {place.triangle, {}}, place.position_O + kToBorder * stratum.spacing_m * way);
-          const bool is_on_border = has_border(surface.neighbors[end.triangle]) && end.barycentric.minCoeff() <= 0;
+          const SurfacePoint end = walk_towards(surface, {place.triangle, {}},
+                                                place.position_O + kToBorder * stratum.spacing_m * way);
+          const bool is_on_border =
+              has_border(surface.neighbors[end.triangle]) && end.barycentric.minCoeff() <= 0;
           if (is_on_border) border_[i].push_back(position(surface.mesh, end));
         }
       }
     });
   }
 
-  /// Finds the place of the stratum, or of the border beside it, that is farthest from all dots. If it is too far away,
-  /// the stratum's own dot moves near enough.
+  /// Finds the place of the stratum, or of the border beside it, that is farthest from all dots. If it is too
+  /// far away, the stratum's own dot moves near enough.
   void close_hole(std::size_t i) {
     const double enough = kMaxDistance * strata_.strata[i].spacing_m;
     const Vector3d here_O = dots_[i].position_O;
@@ -289,12 +296,13 @@ class Relaxation {
   std::vector<SurfacePlace> dots_;
 };
 
-std::vector<Dot> dots_at(const SurfaceCurve& curve, const ToneField& tone, const std::vector<SurfacePlace>& places) {
+std::vector<Dot> dots_at(const SurfaceCurve& curve, const ToneField& tone,
+                         const std::vector<SurfacePlace>& places) {
   std::vector<Dot> dots(places.size());
   tbb::parallel_for(std::size_t{0}, dots.size(), [&](std::size_t i) {
     const SurfacePlace& place = places[i];
-    dots[i] = make_dot(curve.surface(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
-                       place.component);
+    dots[i] = make_dot(curve.surface(), tone,
+                       surface_point_at(curve.mesh(), place.triangle, place.position_O), place.component);
   });
   return dots;
 }

@@ -17,7 +17,8 @@ Coloring color_stretches(const IndexLists& neighbors) {
         const std::uint32_t color = color_of[j / Coloring::kStretch];
         if (color != kNone) taken_by[color] = stretch;
       }
-    const auto free = std::find_if(taken_by.begin(), taken_by.end(), [&](std::uint32_t by) { return by != stretch; });
+    const auto free =
+        std::find_if(taken_by.begin(), taken_by.end(), [&](std::uint32_t by) { return by != stretch; });
     const auto color = static_cast<std::uint32_t>(free - taken_by.begin());
     if (free == taken_by.end()) {
       taken_by.push_back(kNone);

@@ -7,14 +7,15 @@
 /// How dots push each other, and how the surface pulls them.
 namespace hilbrush {
 
-/// (1 - r2/R2)^6 within R, a Gaussian of 2 sigma2 = R2/6 but for .04 of its peak: it ends, needs no exponential, and
-/// has two smooth derivatives. Its Fourier transform in the plane, J_7(kR)/(kR)^7, nowhere falls below -.003 of its
-/// peak: as good as positive, which keeps dots from clumping. Two dots of spacings h and k have sigma2 = kSigma2 (h2 +
-/// k2)/2 and the weight 2hk/(h2 + k2): positive definite whatever the spacings (Gibbs, "Bayesian Gaussian Processes",
-/// 1997, equation 3.82).
+/// (1 - r2/R2)^6 within R, a Gaussian of 2 sigma2 = R2/6 but for .04 of its peak: it ends, needs no
+/// exponential, and has two smooth derivatives. Its Fourier transform in the plane, J_7(kR)/(kR)^7, nowhere
+/// falls below -.003 of its peak: as good as positive, which keeps dots from clumping. Two dots of spacings h
+/// and k have sigma2 = kSigma2 (h2 + k2)/2 and the weight 2hk/(h2 + k2): positive definite whatever the
+/// spacings (Gibbs, "Bayesian Gaussian Processes", 1997, equation 3.82).
 struct PairKernel {
   static constexpr int kExponent = 6;
-  /// At unit spacing. Less keeps dots further apart and lets more noise of low frequencies through; more the reverse.
+  /// At unit spacing. Less keeps dots further apart and lets more noise of low frequencies through; more the
+  /// reverse.
   static constexpr float kSigma2 = .25f;
 
   PairKernel(double h, double k)
@@ -55,8 +56,8 @@ class PlaceSums {
   Sums x_, y_, z_, sums_ = Sums::Zero();
 };
 
-/// Four places on the surface of a stratum, from its middle, each with the share of the stratum's surface that it
-/// stands for (0: none).
+/// Four places on the surface of a stratum, from its middle, each with the share of the stratum's surface
+/// that it stands for (0: none).
 struct FourPulls {
   using Numbers = Eigen::Array4f;
   static constexpr std::size_t kCount = 4;
@@ -66,8 +67,8 @@ struct FourPulls {
   Eigen::Vector3d place(Eigen::Index k) const { return Eigen::Vector3f(x[k], y[k], z[k]).cast<double>(); }
 };
 
-/// Gradient and Hessian of a sum of kernels at one place, along two directions of its tangent plane. Kernels are summed
-/// four side by side.
+/// Gradient and Hessian of a sum of kernels at one place, along two directions of its tangent plane. Kernels
+/// are summed four side by side.
 class TangentSlope {
  public:
   TangentSlope(const Eigen::Vector3d& place_O, const Eigen::Vector3d& x_O, const Eigen::Vector3d& y_O)
@@ -86,7 +87,8 @@ class TangentSlope {
         -kernel.weight * pulls.share);
   }
 
-  /// One Newton step, down along both axes of curvature; curvatures nearer to zero than `least` count as that much.
+  /// One Newton step, down along both axes of curvature; curvatures nearer to zero than `least` count as that
+  /// much.
   Eigen::Vector2f newton_step(float least);
 
  private:
@@ -97,8 +99,10 @@ class TangentSlope {
     waiting_.setZero();
     count_ = 0;
   }
-  void add(const Four& way_x, const Four& way_y, const Four& way_z, const Four& inverse_square, const Four& weight) {
-    const Four u = (1 - inverse_square * (way_x * way_x + way_y * way_y + way_z * way_z)).max(0.f), u2 = u * u;
+  void add(const Four& way_x, const Four& way_y, const Four& way_z, const Four& inverse_square,
+           const Four& weight) {
+    const Four u = (1 - inverse_square * (way_x * way_x + way_y * way_y + way_z * way_z)).max(0.f),
+               u2 = u * u;
     const Four x = way_x * x_.x() + way_y * x_.y() + way_z * x_.z();
     const Four y = way_x * y_.x() + way_y * y_.y() + way_z * y_.z();
     const Four u4 = 12 * inverse_square * weight * u2 * u2, first = u4 * u, second = 10 * inverse_square * u4;

@@ -10,7 +10,8 @@
 namespace hilbrush {
 namespace {
 
-/// In spacings: a stratum is about one spacing wide; places farther apart than this are on two sides of a gap.
+/// In spacings: a stratum is about one spacing wide; places farther apart than this are on two sides of a
+/// gap.
 constexpr double kMaxWidth = 2.5;
 
 /// The places within kMaxWidth spacings of the one that has the most others within that distance.
@@ -28,12 +29,13 @@ std::uint8_t open_places(const PlacedStrata& strata, std::size_t s, double spaci
 }
 
 PlacedStratum measure(const PlacedStrata& strata, std::size_t s, const ToneField& tone, double dot_mass_m2) {
-  // The mean over places of equal mass is weighted by mass: where a stratum has a dark and a light part it keeps to the
-  // dark one, where neighbors are near.
+  // The mean over places of equal mass is weighted by mass: where a stratum has a dark and a light part it
+  // keeps to the dark one, where neighbors are near.
   double asked = 0;
   for (std::size_t p = 0; p < kPlacesAStratum; p += 2) {
     const SurfacePlace& place = strata.place(s, p);
-    asked += tone.asked(surface_point_at(tone.mesh(), place.triangle, place.position_O)) * 2 / kPlacesAStratum;
+    asked +=
+        tone.asked(surface_point_at(tone.mesh(), place.triangle, place.position_O)) * 2 / kPlacesAStratum;
   }
   PlacedStratum stratum;
   stratum.spacing_m = std::sqrt(dot_mass_m2 / std::max(asked, 1e-4));
@@ -50,7 +52,8 @@ PlacedStratum measure(const PlacedStrata& strata, std::size_t s, const ToneField
   stratum.normal_O = (first + last).norm() > .1 ? Eigen::Vector3d((first + last).normalized()) : first;
   for (std::size_t p = 0; p < kPlacesAStratum; ++p)
     if (stratum.open_places >> p & 1u)
-      stratum.radius_m = std::max(stratum.radius_m, (strata.place(s, p).position_O - stratum.middle_O).norm());
+      stratum.radius_m =
+          std::max(stratum.radius_m, (strata.place(s, p).position_O - stratum.middle_O).norm());
   return stratum;
 }
 

@@ -18,8 +18,8 @@ struct PlacedStratum {
   Eigen::Vector3d normal_O;      ///< unit
   double spacing_m = 0;          ///< root of its area
   double radius_m = 0;           ///< of its open places, about the middle
-  std::uint8_t open_places = 0;  ///< bit p: place p may be chosen. Of a stratum that spans a gap, only the heavier side
-                                 ///< is open.
+  std::uint8_t open_places = 0;  ///< bit p: place p may be chosen. Of a stratum that spans a gap, only the
+                                 ///< heavier side is open.
 };
 
 struct PlacedStrata {
@@ -27,7 +27,9 @@ struct PlacedStrata {
   std::vector<SurfacePlace> places;  ///< kPlacesAStratum for each stratum
   std::vector<PlacedStratum> strata;
 
-  const SurfacePlace& place(std::size_t stratum, std::size_t p) const { return places[stratum * kPlacesAStratum + p]; }
+  const SurfacePlace& place(std::size_t stratum, std::size_t p) const {
+    return places[stratum * kPlacesAStratum + p];
+  }
 };
 
 /// The strata of `count` dots. `report` gets the figures of the walk, without the path.

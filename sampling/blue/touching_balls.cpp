@@ -54,7 +54,8 @@ class OctaveGrids {
       if (other == octave) {
         // All balls of the cube look into the same 27 cubes.
         const auto around = cubes_around(other, balls_[entries_[cube.begin].second].center_O);
-        for (std::uint32_t k = cube.begin; k < cube.end; ++k) visit_balls(entries_[k].second, around, true, visit);
+        for (std::uint32_t k = cube.begin; k < cube.end; ++k)
+          visit_balls(entries_[k].second, around, true, visit);
       } else {
         for (std::uint32_t k = cube.begin; k < cube.end; ++k) {
           const std::uint32_t ball = entries_[k].second;
@@ -69,7 +70,8 @@ class OctaveGrids {
   using Surrounding = std::pair<std::array<std::uint32_t, 27>, std::uint32_t>;
 
   int octave_of(double radius_m) const {
-    return std::clamp(static_cast<int>(std::ceil(std::log2(radius_m / smallest_) - 1e-9)), 0, kMaxOctaves - 1);
+    return std::clamp(static_cast<int>(std::ceil(std::log2(radius_m / smallest_) - 1e-9)), 0,
+                      kMaxOctaves - 1);
   }
   /// Two balls of an octave that overlap lie in the same cube or in cubes that touch.
   double side_of(int octave) const { return 2 * smallest_ * std::ldexp(1., octave); }
@@ -78,13 +80,15 @@ class OctaveGrids {
   using Coordinates = std::array<std::int64_t, 3>;
   Coordinates coordinates_of(int octave, const Eigen::Vector3d& p_O) const {
     const Eigen::Vector3d place = p_O / side_of(octave);
-    return {static_cast<std::int64_t>(std::floor(place.x())), static_cast<std::int64_t>(std::floor(place.y())),
+    return {static_cast<std::int64_t>(std::floor(place.x())),
+            static_cast<std::int64_t>(std::floor(place.y())),
             static_cast<std::int64_t>(std::floor(place.z()))};
   }
   /// Cubes half a million sides apart share a key; the distance between balls tells them apart.
   static std::uint64_t key_of(int octave, const Coordinates& c) {
     std::uint64_t key = static_cast<std::uint64_t>(octave);
-    for (const std::int64_t x : c) key = key << kCoordinateBits | (static_cast<std::uint64_t>(x) & kCoordinateMask);
+    for (const std::int64_t x : c)
+      key = key << kCoordinateBits | (static_cast<std::uint64_t>(x) & kCoordinateMask);
     return key;
   }
   std::uint64_t key_of(int octave, const Eigen::Vector3d& p_O) const {
@@ -94,7 +98,8 @@ class OctaveGrids {
   void find_cubes() {
     octave_is_empty_.assign(static_cast<std::size_t>(last_octave_) + 1, true);
     for (std::uint32_t k = 0; k < entries_.size(); ++k) {
-      if (cubes_.empty() || cubes_.back().key != entries_[k].first) cubes_.push_back({entries_[k].first, k, k});
+      if (cubes_.empty() || cubes_.back().key != entries_[k].first)
+        cubes_.push_back({entries_[k].first, k, k});
       cubes_.back().end = k + 1;
       octave_is_empty_[static_cast<std::size_t>(octave_of_key(entries_[k].first))] = false;
     }
@@ -121,8 +126,8 @@ class OctaveGrids {
     Surrounding around{};
     const Coordinates middle = coordinates_of(octave, p_O);
     for (int k = 0; k < 27; ++k) {
-      const std::uint32_t cube =
-          find(key_of(octave, Coordinates{middle[0] + k % 3 - 1, middle[1] + k / 3 % 3 - 1, middle[2] + k / 9 - 1}));
+      const std::uint32_t cube = find(key_of(
+          octave, Coordinates{middle[0] + k % 3 - 1, middle[1] + k / 3 % 3 - 1, middle[2] + k / 9 - 1}));
       if (cube != kNoCube) around.first[around.second++] = cube;
     }
     return around;

@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-/// Which balls overlap, of sizes that may differ by orders of magnitude: dots lie dense where the picture is dark.
+/// Which balls overlap, of sizes that may differ by orders of magnitude: dots lie dense where the picture is
+/// dark.
 namespace hilbrush {
 
 struct SizedBall {
@@ -24,9 +25,9 @@ struct IndexLists {
   }
 };
 
-/// For each ball the others that overlap it and that `accept` (symmetric, thread-safe) accepts. Balls are kept in
-/// grids of one octave of radius each; a pair is found from its smaller ball. Same lists for any number of threads.
-/// Cost: O(balls * octaves + pairs).
+/// For each ball the others that overlap it and that `accept` (symmetric, thread-safe) accepts. Balls are
+/// kept in grids of one octave of radius each; a pair is found from its smaller ball. Same lists for any
+/// number of threads. Cost: O(balls * octaves + pairs).
 IndexLists find_touching_balls(std::span<const SizedBall> balls,
                                const std::function<bool(std::uint32_t, std::uint32_t)>& accept);
 

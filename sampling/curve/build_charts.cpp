@@ -22,7 +22,8 @@ std::vector<FlatComponent> flatten_all(const TexturedMesh& mesh, const Neighbors
   std::vector<FlatComponent> flats(components.size());
   std::size_t done = 0;
   for (std::size_t begin = 0, end = 0; begin < components.size(); begin = end) {
-    for (std::size_t batch = 0; end < components.size() && batch * kProgressSteps <= mesh.triangle_count(); ++end)
+    for (std::size_t batch = 0; end < components.size() && batch * kProgressSteps <= mesh.triangle_count();
+         ++end)
       batch += components[end].triangles.size();
     tbb::parallel_for(begin, end, [&](std::size_t i) {
       flats[i] = flatten(mesh, neighbors, components[i], components[i].area_m2 / area);
@@ -99,10 +100,11 @@ struct PieceIndex {
 
 }  // namespace
 
-Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<Component>& components,
-                    CurveKind kind, const Progress& progress) {
+Charts build_charts(const TexturedMesh& mesh, const Neighbors& neighbors,
+                    const std::vector<Component>& components, CurveKind kind, const Progress& progress) {
   const double area = mesh.area_m2();
-  std::vector<FlatComponent> flats = flatten_all(mesh, neighbors, components, area, progress.part(0, kFlattenShare));
+  std::vector<FlatComponent> flats =
+      flatten_all(mesh, neighbors, components, area, progress.part(0, kFlattenShare));
   Charts result;
   std::vector<PieceIndex> pieces;
   std::vector<ChainPiece> chain_pieces_of;

@@ -12,15 +12,15 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::size_t kMaxFaces = 8;
-/// A quad with at most kSmallShare of a mean triangle's area may hold this many: around a vertex with many triangles,
-/// and along needles, division would not end by itself.
+/// A quad with at most kSmallShare of a mean triangle's area may hold this many: around a vertex with many
+/// triangles, and along needles, division would not end by itself.
 constexpr std::size_t kMaxFacesIfSmall = 64;
 constexpr double kSmallShare = .25;
-/// No quad holds more than 1/kMinQuads of the mesh's area, however few its triangles: threads and strata start from
-/// base quads, and the walk from one down to a patch stays short.
+/// No quad holds more than 1/kMinQuads of the mesh's area, however few its triangles: threads and strata
+/// start from base quads, and the walk from one down to a patch stays short.
 constexpr double kMinQuads = 4000;
-/// Division also ends where it would multiply the listed triangles by more than kSide to this power: by 1.9 with four
-/// children.
+/// Division also ends where it would multiply the listed triangles by more than kSide to this power: by 1.9
+/// with four children.
 constexpr double kTooManyExponent = .926;
 constexpr int kMaxDepth = 24;
 /// The first cube is larger than the box around the faces, and off its middle by an irregular share.
@@ -29,7 +29,8 @@ constexpr double kCubeMiddle = .4871828;
 /// A good map lists each face in a few quads only. Beyond these limits the map is too sheared.
 constexpr std::size_t kMaxListed = 1'000'000;
 constexpr std::size_t kMaxListedPerFace = 60;
-/// In units of the square: what rounding may move an edge by. A triangle that touches a quad must not be lost.
+/// In units of the square: what rounding may move an edge by. A triangle that touches a quad must not be
+/// lost.
 constexpr double kTouch = 1e-14;
 
 /// Builds the base tree of one chart for one kind of curve.
@@ -94,7 +95,8 @@ class TreeBuilder {
     result.area = 2 * piece.area_b() * mesh_.area_vector(face.triangle).norm();
     if constexpr (kDimensions == 2)
       result.density =
-          result.area / (.5 * std::abs(cross(face.places[1] - face.places[0], face.places[2] - face.places[0])));
+          result.area /
+          (.5 * std::abs(cross(face.places[1] - face.places[0], face.places[2] - face.places[0])));
     return result;
   }
 
@@ -132,14 +134,16 @@ class TreeBuilder {
   bool is_leaf(const std::vector<std::uint32_t>& list, double size, int depth) const {
     if (depth == kMaxDepth) return true;
     if (list.size() > kMaxFacesIfSmall) return false;
-    return area_bound(list, size) <= (list.size() <= kMaxFaces ? large_area_ : std::min(small_area_, large_area_));
+    return area_bound(list, size) <=
+           (list.size() <= kMaxFaces ? large_area_ : std::min(small_area_, large_area_));
   }
 
   bool is_out_of_bounds() const {
     return chart_.face_lists.size() > kMaxListed + kMaxListedPerFace * chart_.faces.size();
   }
 
-  void add_leaf(const Place& low, double size, Curve curve, int depth, const std::vector<std::uint32_t>& list) {
+  void add_leaf(const Place& low, double size, Curve curve, int depth,
+                const std::vector<std::uint32_t>& list) {
     BaseQuad quad;
     quad.low.template head<kDimensions>() = low;
     quad.size = size;
@@ -234,7 +238,8 @@ template void clip_to_box<3>(Piece<3>&, const Eigen::Vector3d&, double);
 bool build_base_tree(Chart& chart, const TexturedMesh& mesh, double mesh_area_m2) {
   return with_curve(chart.kind, [&]<class Curve>(Curve) {
     TreeBuilder<Curve>(chart, mesh, mesh_area_m2).build();
-    return kDimensionsOf<Curve> == 3 || chart.face_lists.size() <= kMaxListed + kMaxListedPerFace * chart.faces.size();
+    return kDimensionsOf<Curve> == 3 ||
+           chart.face_lists.size() <= kMaxListed + kMaxListedPerFace * chart.faces.size();
   });
 }
 

@@ -9,9 +9,9 @@
 #include "sampling/curve/piece.h"
 #include "sampling/model/textured_mesh.h"
 
-/// A chart is a part of the surface that one curve walks: a component, or a piece of one, on the unit square or in
-/// space. Its base tree is divided until a quad (in space: a cube) holds few triangles and little area; everything
-/// finer is made again on each walk and not kept.
+/// A chart is a part of the surface that one curve walks: a component, or a piece of one, on the unit square
+/// or in space. Its base tree is divided until a quad (in space: a cube) holds few triangles and little area;
+/// everything finer is made again on each walk and not kept.
 namespace hilbrush {
 
 /// What the curve of a chart fills: the square, or a row of squares, or a cube.
@@ -45,7 +45,8 @@ struct ChartFace {
   std::uint32_t triangle = 0;
   std::uint32_t part = kWhole;  ///< else an index into Chart::parts
   /// The corners on the square; not used in space.
-  std::array<Eigen::Vector2d, 3> places{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  std::array<Eigen::Vector2d, 3> places{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(),
+                                        Eigen::Vector2d::Zero()};
 };
 
 struct Chart {
@@ -89,9 +90,9 @@ Piece<kDimensions> whole_piece(const Chart& chart, const TexturedMesh& mesh, con
 template <int kDimensions>
 void clip_to_box(Piece<kDimensions>& piece, const Eigen::Matrix<double, kDimensions, 1>& low, double size);
 
-/// Builds the base tree of a chart that has its faces; `mesh_area_m2` is the whole mesh's area, which a caller with
-/// many charts sums once. Cost O(faces log faces). On the square it gives up and returns false if the map is so sheared
-/// that the quads would hold each triangle many times.
+/// Builds the base tree of a chart that has its faces; `mesh_area_m2` is the whole mesh's area, which a
+/// caller with many charts sums once. Cost O(faces log faces). On the square it gives up and returns false if
+/// the map is so sheared that the quads would hold each triangle many times.
 bool build_base_tree(Chart& chart, const TexturedMesh& mesh, double mesh_area_m2);
 
 }  // namespace hilbrush

@@ -33,8 +33,8 @@ double angle_at(const TexturedMesh& mesh, std::size_t t, int c) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// How a triangle's area is shared among its corners: equation 6.4; the halves and quarters of Meyer et al. if it is
-/// obtuse.
+/// How a triangle's area is shared among its corners: equation 6.4; the halves and quarters of Meyer et al.
+/// if it is obtuse.
 std::array<double, 3> mixed_areas(const TexturedMesh& mesh, std::size_t t) {
   const double area = mesh.area_vector(t).norm();
   std::array<double, 3> dots{}, lengths2{};  // at corner c; of the side opposite to it
@@ -66,7 +66,8 @@ double bend(const TexturedMesh& mesh, std::uint32_t t, int side, std::uint32_t a
   return length * std::atan2(n.cross(m).dot(edge) / length, n.dot(m));
 }
 
-std::vector<VertexIntegrals> integrate_around(const TexturedMesh& mesh, const Neighbors& neighbors, const Fans& fans) {
+std::vector<VertexIntegrals> integrate_around(const TexturedMesh& mesh, const Neighbors& neighbors,
+                                              const Fans& fans) {
   std::vector<VertexIntegrals> vertices(fans.count);
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
     const std::array<double, 3> areas = mixed_areas(mesh, t);
@@ -76,7 +77,8 @@ std::vector<VertexIntegrals> integrate_around(const TexturedMesh& mesh, const Ne
       vertex.angles += angle_at(mesh, t, static_cast<int>(c));
     }
     for (std::size_t side = 0; side < 3; ++side) {
-      VertexIntegrals &from = vertices[fans.of_corners[t][side]], &to = vertices[fans.of_corners[t][(side + 1) % 3]];
+      VertexIntegrals &from = vertices[fans.of_corners[t][side]],
+                      &to = vertices[fans.of_corners[t][(side + 1) % 3]];
       const TriangleSide across = neighbors[t][side];
       if (across == kNoSide) {
         from.is_boundary = to.is_boundary = true;
@@ -134,7 +136,8 @@ Curvature measure_curvature(const TexturedMesh& mesh) {
 namespace {
 
 /// The value that `share` of the surface's area stays below.
-double quantile_by_area(const TexturedMesh& mesh, const std::vector<std::array<double, 3>>& of_corners, double share) {
+double quantile_by_area(const TexturedMesh& mesh, const std::vector<std::array<double, 3>>& of_corners,
+                        double share) {
   std::vector<std::pair<double, double>> values_and_areas;
   double total = 0;
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {

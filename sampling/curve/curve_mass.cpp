@@ -46,12 +46,14 @@ void CurveMass::measure(QuadMass& result, double& painted_area_m2) {
     pieces[i] = {integral.mass, static_cast<float>(integral.square), face.triangle, center.cast<float>()};
     total += integral.mass;
     painted_area_m2 += integral.area_m2;
-    result.moment_O += integral.mass * position(mesh(), {face.triangle, {1 - center.sum(), center.x(), center.y()}});
+    result.moment_O +=
+        integral.mass * position(mesh(), {face.triangle, {1 - center.sum(), center.x(), center.y()}});
     if constexpr (kDimensions == 2) squares += integral.square * density_on_square(chart, tone, face);
   }
   if constexpr (kDimensions == 2)
     if (std::isfinite(squares))
-      result.misplaced = static_cast<float>(std::sqrt(std::max(0., squares * quad.size * quad.size - total * total)));
+      result.misplaced =
+          static_cast<float>(std::sqrt(std::max(0., squares * quad.size * quad.size - total * total)));
 }
 
 void CurveMass::list_quads() {
@@ -78,7 +80,8 @@ CurveMass::CurveMass(const SurfaceCurve& curve, const ToneField& tone) : curve_(
   std::vector<double> painted_area_m2(quads_.size(), 0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quads_.size(), kGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i)
-      with_curve(chart_of(quads_[i]).kind, [&]<class Curve>(Curve) { measure<Curve>(quads_[i], painted_area_m2[i]); });
+      with_curve(chart_of(quads_[i]).kind,
+                 [&]<class Curve>(Curve) { measure<Curve>(quads_[i], painted_area_m2[i]); });
   });
   painted_area_m2_.assign(curve_.charts().size(), 0);
   mass_before_.assign(quads_.size() + 1, 0);

@@ -11,16 +11,18 @@
 /// What a tone weighs along a curve.
 namespace hilbrush {
 
-/// What a base quad cuts out of one triangle. The mass is exact; the other members only locate it and decide whether
-/// it is even.
+/// What a base quad cuts out of one triangle. The mass is exact; the other members only locate it and decide
+/// whether it is even.
 struct PieceMass {
-  double mass = 0;                                     ///< m^2 of asked coverage
-  float square = 0;                                    ///< as ToneIntegral
-  std::uint32_t triangle = 0;                          ///< as in the face list, which may be far away in memory
+  double mass = 0;             ///< m^2 of asked coverage
+  float square = 0;            ///< as ToneIntegral
+  std::uint32_t triangle = 0;  ///< as in the face list, which may be far away in memory
   Eigen::Vector2f center_b = Eigen::Vector2f::Zero();  ///< center of mass
 
   /// Over a piece of this area.
-  ToneIntegral integral(double area_m2) const { return {area_m2, mass, mass * center_b.cast<double>(), square}; }
+  ToneIntegral integral(double area_m2) const {
+    return {area_m2, mass, mass * center_b.cast<double>(), square};
+  }
 };
 
 struct QuadMass {
@@ -34,12 +36,12 @@ struct QuadMass {
   Eigen::Vector3d moment_O = Eigen::Vector3d::Zero();  ///< mass times position
 };
 
-/// Exact integrals of the asked tone over every piece of every quad of the base tree. Another count or sampler on the
-/// same tone uses them again.
+/// Exact integrals of the asked tone over every piece of every quad of the base tree. Another count or
+/// sampler on the same tone uses them again.
 class CurveMass {
  public:
-  /// Keeps references to both, which must outlive it and stay where they are. Cost: one integral for each triangle in
-  /// each quad, in parallel; 24 bytes for each.
+  /// Keeps references to both, which must outlive it and stay where they are. Cost: one integral for each
+  /// triangle in each quad, in parallel; 24 bytes for each.
   CurveMass(const SurfaceCurve& curve, const ToneField& tone);
 
   double total_m2() const { return mass_before_.back(); }  ///< asked coverage times area

@@ -6,8 +6,8 @@
 #include "sampling/curve/hilbert.h"
 #include "sampling/curve/peano.h"
 
-/// Where a curve in the plane is after a share of its length, and the integral of its position up to there, by a table
-/// that takes a few levels at once.
+/// Where a curve in the plane is after a share of its length, and the integral of its position up to there,
+/// by a table that takes a few levels at once.
 namespace hilbrush {
 
 /// All children of a few levels below a square, in order of the curve, by permutation.
@@ -54,8 +54,9 @@ inline constexpr CurveTable<Curve> kCurveTable{};
 /// As many steps of the table as doubles can tell apart.
 inline constexpr int kMaxCurveSteps = 8;
 
-/// Integral of the curve's position over its first `share`, in the unit square. Within each of the smallest squares
-/// (side 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the position is taken as the square's middle.
+/// Integral of the curve's position over its first `share`, in the unit square. Within each of the smallest
+/// squares (side 8^-steps of a Hilbert curve, 9^-steps of a Peano curve) the position is taken as the
+/// square's middle.
 template <class Curve>
 inline Eigen::Vector2d curve_moment(Curve curve, double share, int steps = kMaxCurveSteps) {
   using Table = CurveTable<Curve>;

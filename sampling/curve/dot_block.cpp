@@ -27,7 +27,8 @@ struct Lifted {
   bool is_inside = false;
 };
 
-/// `likely` is the frame to try first, and becomes the one that was found: neighbors on the curve lie on few faces.
+/// `likely` is the frame to try first, and becomes the one that was found: neighbors on the curve lie on few
+/// faces.
 template <class Walk>
 inline Lifted lift(const Walk& walk, const Vector2d& place, std::uint32_t& likely) {
   const std::uint32_t count = walk.frame_count();
@@ -162,8 +163,8 @@ class CenterWriter : public DotWriter {
   }
 
   template <class Curve>
-  void add(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
-           double to) {
+  void add(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind,
+           double from, double to) {
     if (!(to > from)) return;
     last_quad_ = walk.quad();
     if constexpr (QuadWalk<Curve>::kDimensions == 2)
@@ -191,7 +192,8 @@ class CenterWriter : public DotWriter {
   }
 
  private:
-  /// Each step for all strata before the next step, so that the processor need not wait for one result after another.
+  /// Each step for all strata before the next step, so that the processor need not wait for one result after
+  /// another.
   template <class Curve>
   void add_even_strata(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
                        std::span<const double> ends, std::uint64_t index) {
@@ -236,7 +238,8 @@ class CenterWriter : public DotWriter {
   }
 
   template <class Curve>
-  void add_even(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
+  void add_even(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from,
+                double to) {
     const double mass = (to - from) * node.mass;
     const Lifted lifted = lift(walk, mean_place(node, from, to), likely_frame_);
     const FaceFrame& frame = walk.frame(lifted.frame);
@@ -252,7 +255,8 @@ class CenterWriter : public DotWriter {
   }
 
   template <class Curve>
-  void add_pieces(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from, double to) {
+  void add_pieces(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double from,
+                  double to) {
     const double share = to - from;
     StratumPart& part = begin_part(walk.chart());
     const auto& heaviest = walk.heaviest(node);
@@ -271,8 +275,8 @@ class CenterWriter : public DotWriter {
     const double mass = share * node.scale * heaviest.integral.mass;
     if (mass <= part.heaviest_mass) return;
     part.heaviest_mass = mass;
-    part.heaviest =
-        point_in_triangle(walk.frame(heaviest.frame).triangle, heaviest.integral.first / heaviest.integral.mass);
+    part.heaviest = point_in_triangle(walk.frame(heaviest.frame).triangle,
+                                      heaviest.integral.first / heaviest.integral.mass);
     part.polygon_size = heaviest.piece.corner_count;
     for (std::size_t i = 0; i < part.polygon_size; ++i) part.polygon[i] = heaviest.piece.corners[i].b;
     part.heaviest_quad = StratumPart::kNoQuad;
@@ -280,8 +284,8 @@ class CenterWriter : public DotWriter {
 
   /// Moves the moment of a small patch, taken at the patch's middle, to where the curve runs on this stretch.
   template <class Curve>
-  void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
-                     double from, double to) {
+  void shift_stretch(StratumPart& part, const QuadWalk<Curve>& walk,
+                     const typename QuadWalk<Curve>::Node& node, double from, double to) {
     const Lifted middle = lift(walk, node.low + Vector2d::Constant(.5 * node.size), likely_frame_);
     const Vector2d place = node.low + node.size * stretches_.mean_place(node.curve, from, to, 1);
     const Lifted there = lift(walk, place, likely_frame_);
@@ -312,13 +316,16 @@ class PlaceWriter : public DotWriter {
     put_at(point_in(walk, node, share), walk.chart());
   }
   /// At the end of the curve, when rounding has put the number beyond its last quad.
-  void put_in_quad(std::size_t quad) { put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads()[quad].chart); }
+  void put_in_quad(std::size_t quad) {
+    put_at(heaviest_point(plan_.mass, quad), plan_.mass.quads()[quad].chart);
+  }
 
  private:
-  /// Within a patch the mass is taken as evenly spread over its painted surface: where the curve is on blank surface,
-  /// or beside the surface, other positions in the patch are tried.
+  /// Within a patch the mass is taken as evenly spread over its painted surface: where the curve is on blank
+  /// surface, or beside the surface, other positions in the patch are tried.
   template <class Curve>
-  SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, double share) {
+  SurfacePoint point_in(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node,
+                        double share) {
     if constexpr (QuadWalk<Curve>::kDimensions == 2) {
       const double dots = std::max(1., node.mass / plan_.rule.dot_mass);
       for (int i = 0; i < kMaxTries; ++i) {

@@ -13,8 +13,8 @@ struct DotBlock {
   std::vector<std::size_t> patches_at_depth;  ///< visited; those that begin before the block are not counted
 };
 
-/// Makes blocks of a plan's dots. A block depends on nothing but its dots' numbers; what the maker keeps from block to
-/// block only saves time. For one thread.
+/// Makes blocks of a plan's dots. A block depends on nothing but its dots' numbers; what the maker keeps from
+/// block to block only saves time. For one thread.
 class BlockMaker {
  public:
   explicit BlockMaker(const DotPlan& plan);

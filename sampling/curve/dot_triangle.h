@@ -18,10 +18,13 @@ class DotTriangle {
 
   std::uint32_t triangle() const { return triangle_; }
   /// The asked tone.
-  double asked(const Eigen::Vector3d& barycentric) const { return tone_.asked({barycentric[1], barycentric[2]}); }
-  /// The dot there, moved a hair inside the triangle. `asked` is the tone at `barycentric`, if it is known: it is
-  /// used unless the dot was moved.
-  Dot dot_at(const Eigen::Vector3d& barycentric, std::uint32_t component, std::optional<double> asked = {}) const;
+  double asked(const Eigen::Vector3d& barycentric) const {
+    return tone_.asked({barycentric[1], barycentric[2]});
+  }
+  /// The dot there, moved a hair inside the triangle. `asked` is the tone at `barycentric`, if it is known:
+  /// it is used unless the dot was moved.
+  Dot dot_at(const Eigen::Vector3d& barycentric, std::uint32_t component,
+             std::optional<double> asked = {}) const;
 
  private:
   std::uint32_t triangle_ = kNoTriangle;
@@ -49,6 +52,7 @@ class DotTriangles {
 };
 
 /// The dot at a surface point, moved a hair inside its triangle.
-Dot make_dot(const Surface& surface, const ToneField& tone, const SurfacePoint& point, std::uint32_t component);
+Dot make_dot(const Surface& surface, const ToneField& tone, const SurfacePoint& point,
+             std::uint32_t component);
 
 }  // namespace hilbrush

@@ -6,8 +6,8 @@
 #include "sampling/curve/chart.h"
 #include "sampling/tone/tone_field.h"
 
-/// The affine maps between a face's triangle, the square, space and the texture; and a cache of the latest ones, so
-/// that quads which share a face share its frame.
+/// The affine maps between a face's triangle, the square, space and the texture; and a cache of the latest
+/// ones, so that quads which share a face share its frame.
 namespace hilbrush {
 
 /// A face, with the affine maps of its triangle.

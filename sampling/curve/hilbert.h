@@ -3,12 +3,13 @@
 #include <bit>
 #include <cstdint>
 
-/// The Hilbert curve as integers: in which order a quad's four children (or a cube's eight) are walked, and how the
-/// curve turns in each. A child is named by its slot: bit 0 is the upper half in x, bit 1 in y, bit 2 in z.
+/// The Hilbert curve as integers: in which order a quad's four children (or a cube's eight) are walked, and
+/// how the curve turns in each. A child is named by its slot: bit 0 is the upper half in x, bit 1 in y, bit 2
+/// in z.
 namespace hilbrush {
 
-/// In the plane: the permutation table of the thesis (table 4.1, figure 4.3). The curve starts at the lower left corner
-/// of the square and ends at the lower right one.
+/// In the plane: the permutation table of the thesis (table 4.1, figure 4.3). The curve starts at the lower
+/// left corner of the square and ends at the lower right one.
 struct HilbertQuad {
   static constexpr unsigned kSide = 2;        ///< children along a side
   static constexpr unsigned kChildCount = 4;  ///< kSide^2

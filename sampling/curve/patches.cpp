@@ -72,10 +72,12 @@ struct Stretches {
     for (std::size_t q = first; q < last; ++q)
       if (mass.mass_of(q) > 0) visit(stratum, patch_of_quad(mass, q), 0, 1);
   }
-  void add_quad(std::size_t quad, double from, double to) const { visit(stratum, patch_of_quad(mass, quad), from, to); }
+  void add_quad(std::size_t quad, double from, double to) const {
+    visit(stratum, patch_of_quad(mass, quad), from, to);
+  }
   template <class Curve>
-  void add(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind, double from,
-           double to) const {
+  void add(const QuadWalk<Curve>& walk, const typename QuadWalk<Curve>::Node& node, PatchKind kind,
+           double from, double to) const {
     if (to > from) visit(stratum, patch_of(mass, walk, node, kind), from, to);
   }
   void close(std::uint64_t index) { stratum = index + 1; }
@@ -89,7 +91,8 @@ struct Stretches {
 
 }  // namespace
 
-void visit_patches(const CurveMass& mass, const PatchRule& rule, const std::function<void(const Patch&)>& visit) {
+void visit_patches(const CurveMass& mass, const PatchRule& rule,
+                   const std::function<void(const Patch&)>& visit) {
   const AllPatches sink{mass, visit};
   for (std::size_t q = 0; q < mass.quads().size(); ++q)
     with_curve(mass.chart_of(mass.quads()[q]).kind,

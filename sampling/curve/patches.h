@@ -24,10 +24,11 @@ struct Patch {
 };
 
 /// All patches with mass, in order of the curve, as if something were needed everywhere.
-void visit_patches(const CurveMass& mass, const PatchRule& rule, const std::function<void(const Patch&)>& visit);
+void visit_patches(const CurveMass& mass, const PatchRule& rule,
+                   const std::function<void(const Patch&)>& visit);
 
-/// All strata, as the stretches of patches that they are cut from: visit(stratum, patch, from, to), with shares of the
-/// patch's mass. The same walk that places dots.
+/// All strata, as the stretches of patches that they are cut from: visit(stratum, patch, from, to), with
+/// shares of the patch's mass. The same walk that places dots.
 void visit_stretches(const CurveMass& mass, const SampleOptions& options,
                      const std::function<void(std::uint64_t, const Patch&, double, double)>& visit);
 

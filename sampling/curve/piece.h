@@ -9,7 +9,8 @@
 /// Pieces of triangles: what a quad of the curve's tree cuts out of the surface.
 namespace hilbrush {
 
-/// A corner of a piece: its place where the tree divides (the unit square, or space) and where it is in its triangle.
+/// A corner of a piece: its place where the tree divides (the unit square, or space) and where it is in its
+/// triangle.
 template <int kDimensions>
 struct PieceCorner {
   Eigen::Matrix<double, kDimensions, 1> place;
@@ -55,11 +56,12 @@ struct Piece {
   }
 };
 
-/// Cuts a piece by the plane place[axis] = at, and hands the corners of its parts on, in order. What lies on the plane
-/// belongs to the upper part. Both parts get identical new corners, so that no area is lost or counted twice, whatever
-/// the rounding.
+/// Cuts a piece by the plane place[axis] = at, and hands the corners of its parts on, in order. What lies on
+/// the plane belongs to the upper part. Both parts get identical new corners, so that no area is lost or
+/// counted twice, whatever the rounding.
 template <int kDimensions, class AddLower, class AddUpper>
-void cut_corners(const Piece<kDimensions>& piece, int axis, double at, AddLower add_lower, AddUpper add_upper) {
+void cut_corners(const Piece<kDimensions>& piece, int axis, double at, AddLower add_lower,
+                 AddUpper add_upper) {
   if (piece.corner_count == 0) return;
   const auto* p = &piece.corners[piece.corner_count - 1];
   double dp = p->place[axis] - at;

@@ -18,7 +18,8 @@ constexpr int kMaxHalvings = 40;
 }  // namespace
 
 NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t t, const Vector3d& target) {
-  NearestPoint nearest{{t, nearest_in_triangle(target, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2))}, 0};
+  NearestPoint nearest{
+      {t, nearest_in_triangle(target, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2))}, 0};
   nearest.distance2 = (position(mesh, nearest.point) - target).squaredNorm();
   return nearest;
 }
@@ -41,7 +42,8 @@ SurfacePoint walk_towards(const Surface& surface, const SurfacePoint& start, con
   return here.point;
 }
 
-SurfacePoint point_with_tone(const ToneField& field, std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon) {
+SurfacePoint point_with_tone(const ToneField& field, std::uint32_t triangle,
+                             std::span<const Eigen::Vector2d> polygon) {
   const TriangleTone tone = field.on(triangle);
   Piece<2> piece;
   for (const Eigen::Vector2d& b : polygon) piece.add({b, b});

@@ -15,10 +15,13 @@ struct NearestPoint {
   SurfacePoint point;
   double distance2 = 0;
 };
-NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& target_O);
+NearestPoint nearest_in_triangle(const TexturedMesh& mesh, std::uint32_t triangle,
+                                 const Eigen::Vector3d& target_O);
 
-/// A point that asks for dots, in a polygon within a triangle: the polygon is halved towards its mass until its center
-/// asks for dots. Corners by second and third barycentric coordinate. The polygon's first corner if it has no mass.
-SurfacePoint point_with_tone(const ToneField& tone, std::uint32_t triangle, std::span<const Eigen::Vector2d> polygon);
+/// A point that asks for dots, in a polygon within a triangle: the polygon is halved towards its mass until
+/// its center asks for dots. Corners by second and third barycentric coordinate. The polygon's first corner
+/// if it has no mass.
+SurfacePoint point_with_tone(const ToneField& tone, std::uint32_t triangle,
+                             std::span<const Eigen::Vector2d> polygon);
 
 }  // namespace hilbrush

@@ -6,9 +6,9 @@ namespace hilbrush {
 
 template <class Curve>
 const typename QuadWalk<Curve>::MeasuredPiece& QuadWalk<Curve>::heaviest(const Node& node) const {
-  return pieces_[*std::max_element(node.pieces.begin(), node.pieces.end(), [&](std::uint32_t a, std::uint32_t c) {
-    return pieces_[a].integral.mass < pieces_[c].integral.mass;
-  })];
+  return pieces_[*std::max_element(
+      node.pieces.begin(), node.pieces.end(),
+      [&](std::uint32_t a, std::uint32_t c) { return pieces_[a].integral.mass < pieces_[c].integral.mass; })];
 }
 
 template <class Curve>
@@ -29,8 +29,8 @@ void QuadWalk<Curve>::push_pieces(const QuadMass& quad, const BaseQuad& base, No
   node.pieces = roots_;
 }
 
-/// The standard deviation of the tone on the square, times its area, bounds the mass that an even spread would misplace
-/// (E|t - mean| <= sigma).
+/// The standard deviation of the tone on the square, times its area, bounds the mass that an even spread
+/// would misplace (E|t - mean| <= sigma).
 template <class Curve>
 bool QuadWalk<Curve>::is_even(const Node& node) const {
   double squares = 0, mass = 0;
@@ -49,8 +49,8 @@ void QuadWalk<Curve>::cut_into_children(const Node& node, std::vector<std::vecto
 }
 
 template <class Curve>
-void QuadWalk<Curve>::distribute(const Node& node, std::uint32_t piece, int axis, unsigned slot, unsigned stride,
-                                 std::vector<std::vector<std::uint32_t>>& children) {
+void QuadWalk<Curve>::distribute(const Node& node, std::uint32_t piece, int axis, unsigned slot,
+                                 unsigned stride, std::vector<std::vector<std::uint32_t>>& children) {
   if (!(pieces_[piece].integral.mass > 0)) return;
   if (axis == kDimensions) return children[slot].push_back(piece);
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -77,8 +77,8 @@ typename QuadWalk<Curve>::MeasuredPiece& QuadWalk<Curve>::push() {
   return pieces_[piece_count_++];
 }
 
-/// Puts the lower and the upper part of a piece on the stack. The smaller one is integrated, the larger one gets the
-/// rest.
+/// Puts the lower and the upper part of a piece on the stack. The smaller one is integrated, the larger one
+/// gets the rest.
 template <class Curve>
 void QuadWalk<Curve>::halve(std::uint32_t index, int axis, double at) {
   push();

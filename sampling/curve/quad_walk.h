@@ -9,10 +9,10 @@
 #include "sampling/curve/curve_moment.h"
 #include "sampling/curve/face_frame.h"
 
-/// The walk along the curve below the base tree: from a base quad to its patches, in order. They are made again on each
-/// walk and never stored. After the thesis, section 4.2 and equations 7.3, 7.4; differs: the deviation is exact and
-/// limits the mass that may be misplaced, and a quad in which nothing is needed (no dot, no end of a stratum) is not
-/// divided.
+/// The walk along the curve below the base tree: from a base quad to its patches, in order. They are made
+/// again on each walk and never stored. After the thesis, section 4.2 and equations 7.3, 7.4; differs: the
+/// deviation is exact and limits the mass that may be misplaced, and a quad in which nothing is needed (no
+/// dot, no end of a stratum) is not divided.
 namespace hilbrush {
 
 /// When a quad is fine enough to be a patch.
@@ -114,7 +114,8 @@ class QuadWalk {
   const MeasuredPiece& heaviest(const Node& node) const;
 
  private:
-  /// Smallest side of a quad, in units of the square; what is still too much for one patch is divided in space.
+  /// Smallest side of a quad, in units of the square; what is still too much for one patch is divided in
+  /// space.
   static constexpr double kMinSize = 0x1p-46;
   static constexpr int kMaxLevels = 64;
   /// A part with a smaller share of its whole's mass is taken for a rounding error of the subtraction.
@@ -167,7 +168,8 @@ class QuadWalk {
       child.pieces = children[slot];
       child.curve = node.curve.child(i);
       child.low = node.low;
-      for (int k = 0; k < kDimensions; ++k, slot /= Curve::kSide) child.low[k] += child.size * (slot % Curve::kSide);
+      for (int k = 0; k < kDimensions; ++k, slot /= Curve::kSide)
+        child.low[k] += child.size * (slot % Curve::kSide);
       divide(child, sink, level + 1);
       child.at += child.mass;
     }

@@ -31,8 +31,8 @@ struct Range {
   }
 };
 
-/// The index-th smallest of psi_2(k) over the range. The first digit of psi_2(k) is the last of k, so the numbers that
-/// begin alike are the k of one residue.
+/// The index-th smallest of psi_2(k) over the range. The first digit of psi_2(k) is the last of k, so the
+/// numbers that begin alike are the k of one residue.
 double ranked(const Range& range, std::uint64_t index) {
   std::uint64_t residue = 0;
   int digits = 0;
@@ -54,8 +54,8 @@ std::uint64_t gray(std::uint64_t k) {
   return k ^ (k >> 1);
 }
 
-/// The same of psi_2(gray(k)). The last `digits` digits of gray(k) are those of two residues of k modulo 2^(digits +
-/// 1), each the other's complement; `residue` is the one whose highest digit is 0.
+/// The same of psi_2(gray(k)). The last `digits` digits of gray(k) are those of two residues of k modulo
+/// 2^(digits + 1), each the other's complement; `residue` is the one whose highest digit is 0.
 double ranked_gray(const Range& range, std::uint64_t index) {
   std::uint64_t residue = 0;
   int digits = 0;
@@ -72,7 +72,8 @@ double ranked_gray(const Range& range, std::uint64_t index) {
     }
   }
   const std::uint64_t first = range.first(residue, digits + 1);
-  return radical_inverse_2(gray(first < range.end ? first : range.first(low_bits(digits + 1) ^ residue, digits + 1)));
+  return radical_inverse_2(
+      gray(first < range.end ? first : range.first(low_bits(digits + 1) ^ residue, digits + 1)));
 }
 
 }  // namespace

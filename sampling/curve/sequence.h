@@ -4,8 +4,8 @@
 
 #include "sampling/options/sample_options.h"
 
-/// Sequences of numbers in [0, 1), rising: where along the curve's mass the dots go (the thesis, sections 2.1.2
-/// and 4.4).
+/// Sequences of numbers in [0, 1), rising: where along the curve's mass the dots go (the thesis,
+/// sections 2.1.2 and 4.4).
 ///
 /// jittered      one number at random in each of N equal parts
 /// even          the middle of each
@@ -15,8 +15,8 @@
 /// sobol         the first dimension of ACM algorithm 659: psi_2 of Gray codes; 100 numbers are dropped
 /// niederreiter  the first dimension of ACM algorithm 738 in base 2; 100 numbers are dropped
 ///
-/// In one dimension the last two differ by one step only: the first polynomial of both is x, and algorithm 738 counts
-/// from 0 where 659 counts from 1.
+/// In one dimension the last two differ by one step only: the first polynomial of both is x, and algorithm
+/// 738 counts from 0 where 659 counts from 1.
 namespace hilbrush {
 
 class Sequence {
@@ -24,8 +24,8 @@ class Sequence {
   /// `sampler` is one of the above. kRandom keeps its numbers (8 bytes each); the others keep nothing.
   Sequence(Sampler sampler, std::uint64_t count, std::uint64_t seed);
 
-  /// The index-th smallest number. Cost O(1); O(log N) for halton, sobol and niederreiter, whose numbers are found by
-  /// counting, digit by digit, how many of the first N share the digits so far.
+  /// The index-th smallest number. Cost O(1); O(log N) for halton, sobol and niederreiter, whose numbers are
+  /// found by counting, digit by digit, how many of the first N share the digits so far.
   double at(std::uint64_t index) const;
 
  private:

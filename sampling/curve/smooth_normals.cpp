@@ -13,8 +13,10 @@ class CornerNormals {
  public:
   CornerNormals(const TexturedMesh& mesh, const Neighbors& neighbors) : mesh_(mesh), neighbors_(neighbors) {
     face_normals_.reserve(mesh.triangle_count());
-    for (std::size_t t = 0; t < mesh.triangle_count(); ++t) face_normals_.push_back(mesh.area_vector(t).normalized());
-    normals_.assign(mesh.triangle_count(), {Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()});
+    for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
+      face_normals_.push_back(mesh.area_vector(t).normalized());
+    normals_.assign(mesh.triangle_count(),
+                    {Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()});
     for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
       for (std::uint8_t c = 0; c < 3; ++c)
         if (normals_[t][c].isZero()) fill_around({t, c});

@@ -11,8 +11,8 @@
 #include "sampling/curve/quad_walk.h"
 #include "sampling/curve/sequence.h"
 
-/// Sinks of the walk: one cuts the curve's mass into strata, one finds points along it. Both work on a block of dots
-/// and need nothing of what comes before or after it, so that blocks may be made in any order.
+/// Sinks of the walk: one cuts the curve's mass into strata, one finds points along it. Both work on a block
+/// of dots and need nothing of what comes before or after it, so that blocks may be made in any order.
 namespace hilbrush {
 
 /// Equal stretches of the whole curve's mass, one for each dot.
@@ -45,7 +45,8 @@ void add_one_by_one(Consumer& consumer, Add add, std::span<const double> ends, s
 }
 
 /// Cuts strata `first` to `last` - 1 out of patches, and calls of `consumer`:
-///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as shares of
+///   void add(walk, node, kind, double from, double to)   the current stratum has this stretch of a patch, as
+///   shares of
 ///                                                        its mass
 ///   void close(std::uint64_t index)                      it is complete
 ///   void add_strata(walk, node, kind, std::span<const double> ends, std::uint64_t index)
@@ -81,8 +82,9 @@ class StrataCutter {
   /// A base quad too light to be looked into.
   void take_quad(std::size_t quad, double at, double mass) {
     const auto add = [&](double from, double to) { consumer_.add_quad(quad, from, to); };
-    cut(at, mass, add,
-        [&](std::span<const double> ends, std::uint64_t index) { add_one_by_one(consumer_, add, ends, index); });
+    cut(at, mass, add, [&](std::span<const double> ends, std::uint64_t index) {
+      add_one_by_one(consumer_, add, ends, index);
+    });
   }
 
   /// At the end of the curve: closes the strata that rounding has left open.
@@ -130,7 +132,8 @@ class StrataCutter {
   }
 
   void go_on() {
-    next_ = index_ + 1 < strata_.count ? strata_.begin_of(index_ + 1) : std::numeric_limits<double>::infinity();
+    next_ =
+        index_ + 1 < strata_.count ? strata_.begin_of(index_ + 1) : std::numeric_limits<double>::infinity();
   }
 
   const Strata& strata_;
@@ -145,7 +148,8 @@ class StrataCutter {
 template <class Consumer>
 class PlaceFinder {
  public:
-  PlaceFinder(const Sequence& sequence, double total, std::uint64_t first, std::uint64_t last, Consumer& consumer)
+  PlaceFinder(const Sequence& sequence, double total, std::uint64_t first, std::uint64_t last,
+              Consumer& consumer)
       : sequence_(sequence), total_(total), consumer_(consumer), index_(first), last_(last) {
     next_ = place_of(first);
   }
@@ -218,16 +222,16 @@ class Walks {
       walks_;
 };
 
-/// A base quad with at most this share of a small patch's mass is cut without walking it: where in it a stratum ends
-/// makes no difference.
+/// A base quad with at most this share of a small patch's mass is cut without walking it: where in it a
+/// stratum ends makes no difference.
 inline constexpr double kLightShare = .5;
 
 /// Cuts strata `first` to `last` - 1, with the calls of StrataCutter to `consumer`, and for whole base quads
 ///   void add_quads(std::size_t first, std::size_t last)           `last` not included
 ///   void add_quad(std::size_t quad, double from, double to)   shares of its mass
 template <class Consumer>
-void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,
-                std::vector<std::size_t>& patches_at_depth) {
+void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last,
+                Consumer& consumer, std::vector<std::size_t>& patches_at_depth) {
   const CurveMass& mass = plan.mass;
   StrataCutter cutter(plan.strata, first, last, consumer);
   CountingSink sink(cutter, patches_at_depth);
@@ -256,21 +260,23 @@ void cut_strata(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uin
   cutter.finish();
 }
 
-/// Finds numbers `first` to `last` - 1 of the plan's sequence, with the calls of PlaceFinder to `consumer`, and for
-/// those that rounding has put beyond the last quad
+/// Finds numbers `first` to `last` - 1 of the plan's sequence, with the calls of PlaceFinder to `consumer`,
+/// and for those that rounding has put beyond the last quad
 ///   void put_in_quad(std::size_t quad)
 template <class Consumer>
-void find_places(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last, Consumer& consumer,
-                 std::vector<std::size_t>& patches_at_depth) {
+void find_places(const DotPlan& plan, Walks& walks, std::uint64_t first, std::uint64_t last,
+                 Consumer& consumer, std::vector<std::size_t>& patches_at_depth) {
   const CurveMass& mass = plan.mass;
   PlaceFinder finder(*plan.sequence, mass.total_m2(), first, last, consumer);
   CountingSink sink(finder, patches_at_depth);
   std::size_t last_quad = 0;
-  for (std::size_t q = mass.quad_at(mass.total_m2() * plan.sequence->at(first)); q < mass.quads().size(); ++q) {
+  for (std::size_t q = mass.quad_at(mass.total_m2() * plan.sequence->at(first)); q < mass.quads().size();
+       ++q) {
     if (finder.is_done()) return;
     if (!(mass.mass_of(q) > 0)) continue;
     last_quad = q;
-    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before(q), mass.mass_before(q + 1))) walks.walk(q, sink);
+    if (plan.rule.uniform_depth >= 0 || sink.wants(mass.mass_before(q), mass.mass_before(q + 1)))
+      walks.walk(q, sink);
   }
   for (std::uint64_t i = finder.index(); i < last; ++i) consumer.put_in_quad(last_quad);
 }

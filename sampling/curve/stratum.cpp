@@ -11,8 +11,8 @@ namespace {
 
 /// A point that asks for less than this share of what its stratum's heaviest point asks for counts as blank.
 constexpr double kBlankShare = 1e-3;
-/// Asked tone. A point that asks for this much cannot be blank: the tone that would make it so is 10, and tones end
-/// at 1.
+/// Asked tone. A point that asks for this much cannot be blank: the tone that would make it so is 10, and
+/// tones end at 1.
 constexpr double kSurelyPainted = .01;
 
 /// Of a base quad's faces with mass, the point nearest to `target_O`.
@@ -22,7 +22,8 @@ SurfacePoint nearest_in_quad(const CurveMass& mass, std::size_t quad_index, cons
   // With few dots on a large mesh nothing of it is in the cache: all is requested before the first is needed.
   for (const PieceMass& piece : pieces) __builtin_prefetch(&mesh.triangles[piece.triangle]);
   for (const PieceMass& piece : pieces)
-    for (const std::uint32_t vertex : mesh.triangles[piece.triangle]) __builtin_prefetch(&mesh.vertices[vertex]);
+    for (const std::uint32_t vertex : mesh.triangles[piece.triangle])
+      __builtin_prefetch(&mesh.vertices[vertex]);
   NearestPoint nearest{{}, std::numeric_limits<double>::infinity()};
   for (const PieceMass& piece : pieces) {
     if (!(piece.mass > 0)) continue;
@@ -64,8 +65,8 @@ SurfacePoint heaviest_point(const CurveMass& mass, std::size_t quad_index) {
   const BaseQuad& base = mass.base_quad(quad);
   const Chart& chart = mass.chart_of(quad);
   const std::span<const PieceMass> pieces = mass.pieces_of(quad);
-  const auto heaviest =
-      std::ranges::max_element(pieces, [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; });
+  const auto heaviest = std::ranges::max_element(
+      pieces, [](const PieceMass& a, const PieceMass& b) { return a.mass < b.mass; });
   const SurfacePoint center = point_in_triangle(heaviest->triangle, heaviest->center_b.cast<double>());
   if (mass.tone().asked(center) > 0) return center;
   std::vector<Eigen::Vector2d> polygon;

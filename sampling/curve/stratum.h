@@ -25,8 +25,8 @@ struct StratumPart {
   std::uint32_t triangle = kNoTriangle;
   Eigen::Vector2d moment_b = Eigen::Vector2d::Zero();
 
-  /// Of the patches and quads that it consists of, the heaviest: its center, and the polygon that this is the center of
-  /// (empty: all of it is painted).
+  /// Of the patches and quads that it consists of, the heaviest: its center, and the polygon that this is the
+  /// center of (empty: all of it is painted).
   double heaviest_mass = 0;
   SurfacePoint heaviest;
   std::array<Eigen::Vector2d, 12> polygon;
@@ -77,7 +77,8 @@ struct PaintedPoint {
   double asked = 0;
 };
 
-/// The stratum's center of mass, projected to the surface; where that is blank, a painted point of its heaviest piece.
+/// The stratum's center of mass, projected to the surface; where that is blank, a painted point of its
+/// heaviest piece.
 PaintedPoint center_on_surface(const CurveMass& mass, DotTriangles& triangles, const StratumPart& part);
 
 /// A painted point of a base quad that has mass, in its heaviest triangle.

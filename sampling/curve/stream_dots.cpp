@@ -16,8 +16,8 @@
 namespace hilbrush {
 namespace {
 
-/// Dots are made in blocks whose size depends on nothing but their number, so that the result does not depend on the
-/// threads.
+/// Dots are made in blocks whose size depends on nothing but their number, so that the result does not depend
+/// on the threads.
 constexpr std::uint64_t kMaxDotsInBlock = 4096;
 constexpr std::uint64_t kMinDotsInBlock = 128;
 constexpr std::uint64_t kMinBlocks = 64;
@@ -63,7 +63,8 @@ class BlockStream {
         tbb::task_group group;
         ~Waiter() { group.wait(); }
       } waiter;
-      if (begin + kBlocksAtOnce < block_count_) waiter.group.run([&] { make_batch(begin + kBlocksAtOnce, next_); });
+      if (begin + kBlocksAtOnce < block_count_)
+        waiter.group.run([&] { make_batch(begin + kBlocksAtOnce, next_); });
       for (std::size_t i = 0; i < blocks_from(begin); ++i)
         visit(ready_[i], std::min(plan_.strata.count, (begin + i + 1) * block_size_));
       waiter.group.wait();
@@ -100,11 +101,13 @@ std::uint64_t count_dots(const CurveMass& curve_mass, const SampleOptions& optio
   const double mass = curve_mass.total_m2();
   if (!(mass > 0)) {
     if (options.dot_count)
-      throw InputError("", "the surface asks for no dots at all: it is blank, white or transparent everywhere");
+      throw InputError("",
+                       "the surface asks for no dots at all: it is blank, white or transparent everywhere");
     return 0;
   }
-  const double count = options.pitch_m ? std::max(1., std::round(mass / (*options.pitch_m * *options.pitch_m)))
-                                       : static_cast<double>(*options.dot_count);
+  const double count = options.pitch_m
+                           ? std::max(1., std::round(mass / (*options.pitch_m * *options.pitch_m)))
+                           : static_cast<double>(*options.dot_count);
   check_dot_limit(options, count);
   return static_cast<std::uint64_t>(count);
 }
@@ -113,8 +116,8 @@ double pitch_of(const CurveMass& mass, const SampleOptions& options, std::uint64
   return options.pitch_m.value_or(std::sqrt(mass.total_m2() / static_cast<double>(count)));
 }
 
-void stream_dots(const CurveMass& mass, const SampleOptions& options, const DotVisitor& visit, SampleReport* report,
-                 const Progress& progress) {
+void stream_dots(const CurveMass& mass, const SampleOptions& options, const DotVisitor& visit,
+                 SampleReport* report, const Progress& progress) {
   CHECK(options.sampler != Sampler::kBlue);
   const std::uint64_t count = count_dots(mass, options);
   SampleReport figures = report_areas(mass);
@@ -140,8 +143,8 @@ DotSequence place_dots(const CurveMass& mass, const SampleOptions& options, Samp
   sequence.dots.reserve(count);
   stream_dots(
       mass, options,
-      [&](std::span<const Dot> dots) { sequence.dots.insert(sequence.dots.end(), dots.begin(), dots.end()); }, report,
-      progress);
+      [&](std::span<const Dot> dots) { sequence.dots.insert(sequence.dots.end(), dots.begin(), dots.end()); },
+      report, progress);
   return sequence;
 }
 

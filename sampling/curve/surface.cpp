@@ -7,8 +7,8 @@
 namespace hilbrush {
 namespace {
 
-/// A beam that is aimed at the very edge of an open surface may miss it: dots keep this far away from the edges of
-/// their triangles, 2 micrometers, but no farther than a tenth of the triangle's height.
+/// A beam that is aimed at the very edge of an open surface may miss it: dots keep this far away from the
+/// edges of their triangles, 2 micrometers, but no farther than a tenth of the triangle's height.
 constexpr double kInsetM = 2e-6;
 constexpr double kMaxInsetShare = .1;
 
@@ -22,7 +22,8 @@ std::vector<DotSurface> find_dot_surfaces(const TexturedMesh& mesh, const Neighb
     result[t].corner_normals = corner_normals[t];
     for (int c = 0; c < 3; ++c) {
       const double opposite = (mesh.corner(t, (c + 1) % 3) - mesh.corner(t, (c + 2) % 3)).norm();
-      result[t].least_barycentric[c] = static_cast<float>(std::min(kMaxInsetShare, kInsetM * opposite / (2 * area)));
+      result[t].least_barycentric[c] =
+          static_cast<float>(std::min(kMaxInsetShare, kInsetM * opposite / (2 * area)));
     }
   }
   return result;

@@ -28,9 +28,10 @@ struct ComponentReport {
 /// Independent of tone, count and sampler.
 class SurfaceCurve {
  public:
-  /// Keeps a reference to `mesh`, which must outlive it. `kind` is kHilbert or kPeano2; what cannot be mapped follows a
-  /// 3D Hilbert curve either way. @throws InputError if the mesh has no area.
-  explicit SurfaceCurve(const TexturedMesh& mesh, CurveKind kind = CurveKind::kHilbert, const Progress& progress = {});
+  /// Keeps a reference to `mesh`, which must outlive it. `kind` is kHilbert or kPeano2; what cannot be mapped
+  /// follows a 3D Hilbert curve either way. @throws InputError if the mesh has no area.
+  explicit SurfaceCurve(const TexturedMesh& mesh, CurveKind kind = CurveKind::kHilbert,
+                        const Progress& progress = {});
   ~SurfaceCurve();
   SurfaceCurve(SurfaceCurve&&) noexcept;
 

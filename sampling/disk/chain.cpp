@@ -8,10 +8,12 @@
 namespace hilbrush {
 namespace {
 
-/// Points of which the nearest can be found and any be removed: a k-d tree that counts the points left in each part.
+/// Points of which the nearest can be found and any be removed: a k-d tree that counts the points left in
+/// each part.
 class RemovablePoints {
  public:
-  explicit RemovablePoints(std::vector<Eigen::Vector3d> points) : points_(std::move(points)), order_(points_.size()) {
+  explicit RemovablePoints(std::vector<Eigen::Vector3d> points)
+      : points_(std::move(points)), order_(points_.size()) {
     std::iota(order_.begin(), order_.end(), 0u);
     place_.resize(points_.size());
     build(0, points_.size());
@@ -90,12 +92,14 @@ class RemovablePoints {
         if (!is_gone_.empty() && is_gone_[point]) continue;
         const double distance2 = (points_[point] - to).squaredNorm();
         // Any point is better than none, also at a distance that is infinite or not a number.
-        if (best.point == kNone || distance2 < best.distance2 || (distance2 == best.distance2 && point < best.point))
+        if (best.point == kNone || distance2 < best.distance2 ||
+            (distance2 == best.distance2 && point < best.point))
           best = {distance2, point};
       }
       return;
     }
-    const bool is_second_nearer = distance2_to(nodes_[node.child + 1], to) < distance2_to(nodes_[node.child], to);
+    const bool is_second_nearer =
+        distance2_to(nodes_[node.child + 1], to) < distance2_to(nodes_[node.child], to);
     search(node.child + (is_second_nearer ? 1 : 0), to, best);
     search(node.child + (is_second_nearer ? 0 : 1), to, best);
   }
@@ -108,7 +112,8 @@ class RemovablePoints {
 
 /// The corner that the symmetry moves to where `corner` is.
 std::size_t corner_before(const Symmetry& symmetry, std::size_t corner) {
-  bool x = (corner == 1 || corner == 2) != symmetry.is_mirrored_x, y = (corner >= 2) != symmetry.is_mirrored_y;
+  bool x = (corner == 1 || corner == 2) != symmetry.is_mirrored_x,
+       y = (corner >= 2) != symmetry.is_mirrored_y;
   if (symmetry.is_swapped) std::swap(x, y);
   return y ? (x ? 2u : 3u) : (x ? 1u : 0u);
 }
@@ -124,12 +129,15 @@ Symmetry symmetry_of(std::size_t index) {
   return {(index & 4u) != 0, (index & 1u) != 0, (index & 2u) != 0};
 }
 std::size_t symmetry_count(const ChainPiece& piece) {
-  return piece.turns == Turns::kNone ? 1 : piece.turns == Turns::kMirrors ? kSymmetryCount / 2 : kSymmetryCount;
+  return piece.turns == Turns::kNone      ? 1
+         : piece.turns == Turns::kMirrors ? kSymmetryCount / 2
+                                          : kSymmetryCount;
 }
 
 std::vector<std::uint32_t> nearest_next(const std::vector<ChainPiece>& pieces) {
   std::vector<Eigen::Vector3d> corners;
-  for (const ChainPiece& piece : pieces) corners.insert(corners.end(), piece.corners_O.begin(), piece.corners_O.end());
+  for (const ChainPiece& piece : pieces)
+    corners.insert(corners.end(), piece.corners_O.begin(), piece.corners_O.end());
   RemovablePoints left(std::move(corners));
   std::vector<std::uint32_t> chain;
   for (std::uint32_t piece = 0, corner = 0;;) {
@@ -149,7 +157,8 @@ std::vector<std::uint32_t> nearest_next(const std::vector<ChainPiece>& pieces) {
 std::vector<ChainLink> chain_pieces(const std::vector<ChainPiece>& pieces) {
   if (pieces.empty()) return {};
   const std::vector<std::uint32_t> order = nearest_next(pieces);
-  // Dynamic programming: the shortest path to each symmetry of a piece over all symmetries of the piece before.
+  // Dynamic programming: the shortest path to each symmetry of a piece over all symmetries of the piece
+  // before.
   std::vector<std::array<std::uint8_t, kSymmetryCount>> from(order.size());
   std::array<double, kSymmetryCount> length{};
   for (std::size_t i = 1; i < order.size(); ++i) {
@@ -158,7 +167,8 @@ std::vector<ChainLink> chain_pieces(const std::vector<ChainPiece>& pieces) {
     for (std::size_t s = 0; s < symmetry_count(piece); ++s) {
       longer[s] = std::numeric_limits<double>::infinity();
       for (std::size_t r = 0; r < symmetry_count(last); ++r) {
-        const double sum = length[r] + (begin_of(piece, symmetry_of(s)) - end_of(last, symmetry_of(r))).norm();
+        const double sum =
+            length[r] + (begin_of(piece, symmetry_of(s)) - end_of(last, symmetry_of(r))).norm();
         if (sum >= longer[s]) continue;
         longer[s] = sum;
         from[i][s] = static_cast<std::uint8_t>(r);
@@ -167,7 +177,8 @@ std::vector<ChainLink> chain_pieces(const std::vector<ChainPiece>& pieces) {
     length = longer;
   }
   const auto last_count = static_cast<std::ptrdiff_t>(symmetry_count(pieces[order.back()]));
-  auto s = static_cast<std::size_t>(std::min_element(length.begin(), length.begin() + last_count) - length.begin());
+  auto s = static_cast<std::size_t>(std::min_element(length.begin(), length.begin() + last_count) -
+                                    length.begin());
   std::vector<ChainLink> chain(order.size());
   for (std::size_t i = order.size(); i-- > 0;) {
     chain[i] = {order[i], symmetry_of(s)};

@@ -14,16 +14,16 @@ enum class Turns : std::uint8_t {
   kMirrorsAndSwap,  ///< of one square: x and y may be swapped too
 };
 
-/// A piece for the chain: its curve begins at corner 0 (lower left; then lower right, upper right, upper left) and ends
-/// at `end_corner`; the same holds after a symmetry.
+/// A piece for the chain: its curve begins at corner 0 (lower left; then lower right, upper right, upper
+/// left) and ends at `end_corner`; the same holds after a symmetry.
 struct ChainPiece {
   std::array<Eigen::Vector3d, 4> corners_O;
   std::uint8_t end_corner = 1;
   Turns turns = Turns::kNone;
 };
 
-/// A symmetry of a row of squares: first x and y are swapped, then mirrored. It decides in which corner the curve
-/// begins; mirrored in x it runs backwards.
+/// A symmetry of a row of squares: first x and y are swapped, then mirrored. It decides in which corner the
+/// curve begins; mirrored in x it runs backwards.
 struct Symmetry {
   bool is_swapped = false, is_mirrored_x = false, is_mirrored_y = false;
 
@@ -38,8 +38,8 @@ struct ChainLink {
   Symmetry symmetry;
 };
 
-/// Begins with piece 0 and continues with the piece that has the nearest corner, and so on; then chooses the symmetries
-/// so that the sum of all jumps is least. Cost about O(n log n).
+/// Begins with piece 0 and continues with the piece that has the nearest corner, and so on; then chooses the
+/// symmetries so that the sum of all jumps is least. Cost about O(n log n).
 std::vector<ChainLink> chain_pieces(const std::vector<ChainPiece>& pieces);
 
 /// Sum of the jumps from the end of each piece to the beginning of the next.

@@ -6,7 +6,8 @@
 namespace hilbrush {
 namespace {
 
-std::vector<std::uint32_t> collect(std::uint32_t seed, const Neighbors& neighbors, std::vector<char>& is_seen) {
+std::vector<std::uint32_t> collect(std::uint32_t seed, const Neighbors& neighbors,
+                                   std::vector<char>& is_seen) {
   std::vector<std::uint32_t> triangles{seed};
   is_seen[seed] = 1;
   for (std::size_t i = 0; i < triangles.size(); ++i)
@@ -35,8 +36,8 @@ Fans find_fans(const Neighbors& neighbors) {
     for (std::uint8_t c = 0; c < 3; ++c) {
       if (fans.of_corners[t][c] != kUnseen) continue;
       const std::uint32_t fan = fans.count++;
-      // Side c leaves the corner; the side before arrives. Go around one way until the fan closes or ends, then the
-      // other way.
+      // Side c leaves the corner; the side before arrives. Go around one way until the fan closes or ends,
+      // then the other way.
       TriangleSide at{t, c};
       do {
         fans.of_corners[at.triangle][at.side] = fan;
@@ -96,7 +97,8 @@ Component describe_component(const TexturedMesh& mesh, const Neighbors& neighbor
   }
   const auto count = static_cast<std::int64_t>(triangles.size());
   component.boundary_loops = static_cast<int>(boundary_loops(inside).size());
-  component.genus = genus_of(find_fans(inside).count, (3 * count + open_sides) / 2, count, component.boundary_loops);
+  component.genus =
+      genus_of(find_fans(inside).count, (3 * count + open_sides) / 2, count, component.boundary_loops);
   component.triangles = std::move(triangles);
   return component;
 }
@@ -131,7 +133,8 @@ std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbors
   for (std::size_t i = 0; i < components.size(); ++i) {
     Component& component = components[i];
     const auto triangles = static_cast<std::int64_t>(component.triangles.size());
-    component.genus = genus_of(fan_count[i], (3 * triangles + open_sides[i]) / 2, triangles, component.boundary_loops);
+    component.genus =
+        genus_of(fan_count[i], (3 * triangles + open_sides[i]) / 2, triangles, component.boundary_loops);
   }
   return components;
 }

@@ -18,7 +18,8 @@ struct Component {
   double area_m2 = 0;
 };
 
-/// Triangles are connected over shared edges; the components are in order of their first triangles. Cost O(n).
+/// Triangles are connected over shared edges; the components are in order of their first triangles. Cost
+/// O(n).
 std::vector<Component> find_components(const TexturedMesh& mesh, const Neighbors& neighbors);
 
 /// The shape of some connected triangles, in rising order; sides to other triangles are boundary.
@@ -28,8 +29,8 @@ Component describe_component(const TexturedMesh& mesh, const Neighbors& neighbor
 /// All loops of sides without a neighbor, in order of their first sides.
 std::vector<BoundaryLoop> boundary_loops(const Neighbors& neighbors);
 
-/// The fans of a mesh: all corners that are connected around a vertex have the same number, in order of their first
-/// corners.
+/// The fans of a mesh: all corners that are connected around a vertex have the same number, in order of their
+/// first corners.
 struct Fans {
   std::vector<Triangle> of_corners;  ///< numbers, by triangle and corner
   std::uint32_t count = 0;

@@ -18,7 +18,8 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// Of a cotangent weight: a map without flipped faces needs positive ones, and an accurate factor needs bounded ones.
+/// Of a cotangent weight: a map without flipped faces needs positive ones, and an accurate factor needs
+/// bounded ones.
 constexpr double kMinWeight = 1e-4;
 constexpr double kMaxWeight = 1e3;
 /// Vertices; for smaller graphs METIS gains nothing.
@@ -42,8 +43,8 @@ double mean_value_half(const Disk& disk, std::uint32_t face, std::size_t from, s
   return std::max(weight, 1e-12);
 }
 
-/// `half(face, from, to)`: what a face gives to the arc between two of its corners. `limit` sees the sum of both
-/// halves.
+/// `half(face, from, to)`: what a face gives to the arc between two of its corners. `limit` sees the sum of
+/// both halves.
 template <class Half, class Limit>
 WeightedGraph make_graph(const Disk& disk, Half half, Limit limit) {
   WeightedGraph graph;
@@ -100,8 +101,8 @@ struct FreeVertices {
   }
 };
 
-/// The linear system of the free vertices; of a symmetric one only up to the diagonal of each row. The terms of the
-/// fixed vertices are in the right sides.
+/// The linear system of the free vertices; of a symmetric one only up to the diagonal of each row. The terms
+/// of the fixed vertices are in the right sides.
 struct System {
   Sparse rows;  ///< column i holds row i
   Eigen::MatrixXd right;
@@ -157,8 +158,8 @@ std::vector<std::uint32_t> dissected(const WeightedGraph& graph) {
   std::array<idx_t, METIS_NOPTIONS> options{};
   METIS_SetDefaultOptions(options.data());
   options[METIS_OPTION_COMPRESS] = 0;  // no two vertices of a mesh have the same neighbors
-  const int result =
-      METIS_NodeND(&vertex_count, begin.data(), to.data(), nullptr, options.data(), order.data(), place.data());
+  const int result = METIS_NodeND(&vertex_count, begin.data(), to.data(), nullptr, options.data(),
+                                  order.data(), place.data());
   CHECK(result == METIS_OK);
   return {order.begin(), order.end()};
 }
@@ -169,7 +170,8 @@ std::vector<std::uint32_t> least_degree(const WeightedGraph& graph) {
   std::iota(order.begin(), order.end(), 0u);
   const auto n = static_cast<Eigen::Index>(graph.vertex_count());
   // Transposing sorts the columns, which AMD wants.
-  const Sparse pattern = System(graph, FreeVertices(order, none), false, Eigen::MatrixXd(n, 0)).rows.transpose();
+  const Sparse pattern =
+      System(graph, FreeVertices(order, none), false, Eigen::MatrixXd(n, 0)).rows.transpose();
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
   Eigen::AMDOrdering<int>()(pattern, permutation);
   for (std::size_t i = 0; i < order.size(); ++i)
@@ -180,7 +182,8 @@ std::vector<std::uint32_t> least_degree(const WeightedGraph& graph) {
 }  // namespace
 
 WeightedGraph cotan_graph(const Disk& disk) {
-  return make_graph(disk, cotan_half, [](double weight) { return std::clamp(weight, kMinWeight, kMaxWeight); });
+  return make_graph(disk, cotan_half,
+                    [](double weight) { return std::clamp(weight, kMinWeight, kMaxWeight); });
 }
 
 WeightedGraph mean_value_graph(const Disk& disk) {
@@ -201,7 +204,8 @@ bool solve_symmetric(const WeightedGraph& graph, const std::vector<std::uint32_t
   return solve(solver, free, system.right, values);
 }
 
-bool solve_general(const WeightedGraph& graph, const std::vector<char>& is_fixed, Eigen::Ref<Eigen::MatrixXd> values) {
+bool solve_general(const WeightedGraph& graph, const std::vector<char>& is_fixed,
+                   Eigen::Ref<Eigen::MatrixXd> values) {
   std::vector<std::uint32_t> order(graph.vertex_count());
   std::iota(order.begin(), order.end(), 0u);
   const FreeVertices free(order, is_fixed);

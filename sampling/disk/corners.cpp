@@ -13,7 +13,8 @@ namespace {
 /// Radians. A boundary vertex that turns by more is a corner of the shape itself.
 constexpr double kShapeCornerTurn = std::numbers::pi / 4;
 constexpr double kMinSideShare = .005;
-/// With more forks than this the corners are not chosen among them: the search takes all combinations of four.
+/// With more forks than this the corners are not chosen among them: the search takes all combinations of
+/// four.
 constexpr std::size_t kMaxForks = 16;
 
 /// Distance of a slit's corners from its tips, as a share of the loop: x / pi where tan(x) = (sqrt(2) - 1)^2.
@@ -35,8 +36,8 @@ void add_middle_of_longest(std::vector<std::size_t>& corners, const std::vector<
   std::sort(corners.begin(), corners.end());
 }
 
-/// The shape's own corners, sharpest first; a shape with fewer than four gets the others in the middle of its longest
-/// sides.
+/// The shape's own corners, sharpest first; a shape with fewer than four gets the others in the middle of its
+/// longest sides.
 std::optional<Corners> corners_of_shape(const CutDisk& cut, const std::vector<double>& along) {
   std::vector<double> turn(cut.disk.positions().size(), std::numbers::pi);
   for (std::uint32_t f = 0; f < cut.disk.faces().size(); ++f)
@@ -63,8 +64,10 @@ Corners corners_at(const std::array<double, 4>& shares, const std::vector<double
   Corners corners{};
   for (std::size_t k = 0; k < 4; ++k) {
     const double wanted = shares[k] * along.back();
-    const auto above = static_cast<std::size_t>(std::lower_bound(along.begin(), along.end(), wanted) - along.begin());
-    const std::size_t nearest = above > 0 && wanted - along[above - 1] < along[above] - wanted ? above - 1 : above;
+    const auto above =
+        static_cast<std::size_t>(std::lower_bound(along.begin(), along.end(), wanted) - along.begin());
+    const std::size_t nearest =
+        above > 0 && wanted - along[above - 1] < along[above] - wanted ? above - 1 : above;
     corners[k] = std::min(std::max(nearest, k == 0 ? 0 : corners[k - 1] + 1), n - 4 + k);
   }
   return corners;
@@ -95,8 +98,8 @@ std::optional<Corners> corners_at_forks(const CutDisk& cut, const std::vector<do
   return best;
 }
 
-/// Where a point of a slit's loop lies on the boundary of the half plane, if the surface is a sphere and the slit goes
-/// from pole to pole; corners at +-(sqrt(2) - 1) and +-(sqrt(2) + 1), the loop's start at 0.
+/// Where a point of a slit's loop lies on the boundary of the half plane, if the surface is a sphere and the
+/// slit goes from pole to pole; corners at +-(sqrt(2) - 1) and +-(sqrt(2) + 1), the loop's start at 0.
 double on_half_plane(double share) {
   const double root = std::sqrt(std::tan(std::numbers::pi * std::min(share, 1 - share)));
   return share < .5 ? root : -root;
@@ -106,7 +109,8 @@ double on_half_plane(double share) {
 /// lemniscate's arc.
 double along_square(double x) {
   const double p = std::clamp(.5 * (x - 1 / x), -1., 1.);
-  const double arc = std::ellint_1(std::numbers::sqrt2 / 2, std::asin(std::abs(p) * std::sqrt(2 / (1 + p * p))));
+  const double arc =
+      std::ellint_1(std::numbers::sqrt2 / 2, std::asin(std::abs(p) * std::sqrt(2 / (1 + p * p))));
   return .5 * (1 + std::copysign(arc / std::comp_ellint_1(std::numbers::sqrt2 / 2), p));
 }
 
@@ -122,9 +126,9 @@ double along_slit(double share) {
   return (x < 0 ? 4 : 0) - .5 + along_square((1 + x) / (1 - x));
 }
 
-/// How far along the long sides of a rectangle its corners must go towards their middles (back around the ends if
-/// negative, in shares of the side they are on), for it to become a whole number of squares. Each end is taken for that
-/// of a half strip, which cosh(pi z) maps to a half plane.
+/// How far along the long sides of a rectangle its corners must go towards their middles (back around the
+/// ends if negative, in shares of the side they are on), for it to become a whole number of squares. Each end
+/// is taken for that of a half strip, which cosh(pi z) maps to a half plane.
 double shift_for_whole_squares(double length) {
   constexpr double kPi = std::numbers::pi;
   const double below = std::floor(length), whole = length * length < below * (below + 1) ? below : below + 1;
@@ -163,7 +167,8 @@ std::vector<double> boundary_measure(const CutDisk& cut, const std::vector<doubl
 }
 
 Corners choose_corners(const CutDisk& cut, const std::vector<double>& along) {
-  if (is_slit(cut)) return corners_at({kSlitCorner, .5 - kSlitCorner, .5 + kSlitCorner, 1 - kSlitCorner}, along);
+  if (is_slit(cut))
+    return corners_at({kSlitCorner, .5 - kSlitCorner, .5 + kSlitCorner, 1 - kSlitCorner}, along);
   const auto natural = cut.is_cut ? corners_at_forks(cut, along) : corners_of_shape(cut, along);
   if (!natural) return corners_at({.125, .375, .625, .875}, along);
   const Corners& c = *natural;
@@ -171,10 +176,12 @@ Corners choose_corners(const CutDisk& cut, const std::vector<double>& along) {
   return s[0] + s[2] >= s[1] + s[3] ? c : Corners{c[1], c[2], c[3], c[0]};
 }
 
-std::optional<Corners> corners_for_whole_squares(const CutDisk& cut, const std::vector<double>& along, double modulus) {
+std::optional<Corners> corners_for_whole_squares(const CutDisk& cut, const std::vector<double>& along,
+                                                 double modulus) {
   constexpr double kFits = .03;
   if (!is_slit(cut) || std::abs(std::log(modulus / std::round(modulus))) < kFits) return std::nullopt;
-  const double shift = modulus >= 1 ? shift_for_whole_squares(modulus) : -shift_for_whole_squares(1 / modulus);
+  const double shift =
+      modulus >= 1 ? shift_for_whole_squares(modulus) : -shift_for_whole_squares(1 / modulus);
   std::array<double, 4> shares{.5 + shift, 1.5 - shift, 2.5 + shift, 3.5 - shift};
   for (double& share : shares) share /= 4;
   return corners_at(shares, boundary_measure(cut, along));

@@ -16,20 +16,21 @@ namespace {
 
 /// Sides of an outer boundary are split until none is longer than this share of the whole boundary.
 constexpr double kMaxBoundarySide = 1. / 16;
-/// Halving a side of length l until its parts are short enough takes less than 2 l / (kMaxBoundarySide * whole
-/// boundary) splits, and all sides together this many. More are needed only where rounding keeps halves as long as
-/// their whole: on a boundary of a few last digits of its coordinates.
+/// Halving a side of length l until its parts are short enough takes less than 2 l / (kMaxBoundarySide *
+/// whole boundary) splits, and all sides together this many. More are needed only where rounding keeps halves
+/// as long as their whole: on a boundary of a few last digits of its coordinates.
 constexpr int kMaxBoundarySplits = static_cast<int>(2 / kMaxBoundarySide);
 /// Faces after refine(): of the whole mesh, shared out by area, and of one component at most.
 constexpr double kRefinedMesh = 40'000;
 constexpr double kRefinedComponent = 5000;
-/// The same after split_towards_delaunay(). A component grows to at most kMaxGrowth times its faces; kMinGrowth times
-/// is allowed to every component, whatever the other limits say.
+/// The same after split_towards_delaunay(). A component grows to at most kMaxGrowth times its faces;
+/// kMinGrowth times is allowed to every component, whatever the other limits say.
 constexpr double kDelaunayMesh = 200'000;
 constexpr double kDelaunayComponent = 80'000;
 constexpr double kMaxGrowth = 16;
 constexpr double kMinGrowth = 1.1;
-/// A disk whose boundary, over the root of its area, is shorter is a bag: it is slit from its mouth to the far end.
+/// A disk whose boundary, over the root of its area, is shorter is a bag: it is slit from its mouth to the
+/// far end.
 constexpr double kMinBoundary = 1.2;
 /// This many roots are tried for the loops that open handles.
 constexpr int kRootCount = 4;
@@ -40,7 +41,8 @@ struct Distances {
   std::vector<TriangleSide> last_side;  ///< the side that arrives at the vertex (or leaves it, on a boundary)
 
   std::uint32_t farthest() const {
-    return static_cast<std::uint32_t>(std::max_element(to_vertex.begin(), to_vertex.end()) - to_vertex.begin());
+    return static_cast<std::uint32_t>(std::max_element(to_vertex.begin(), to_vertex.end()) -
+                                      to_vertex.begin());
   }
 };
 
@@ -78,7 +80,8 @@ Distances distances_from(const std::vector<std::uint32_t>& sources, const Disk& 
 
 std::vector<TriangleSide> path_to_source(const Disk& disk, const Distances& distances, std::uint32_t v) {
   std::vector<TriangleSide> path;
-  for (; distances.last_side[v] != kNoSide; v = disk.from(path.back())) path.push_back(distances.last_side[v]);
+  for (; distances.last_side[v] != kNoSide; v = disk.from(path.back()))
+    path.push_back(distances.last_side[v]);
   return path;
 }
 
@@ -99,15 +102,17 @@ double length_of(const Disk& disk, const std::vector<TriangleSide>& sides) {
 /// Longest loop first.
 std::vector<BoundaryLoop> sorted_loops(const Disk& disk) {
   std::vector<BoundaryLoop> loops = boundary_loops(disk.neighbors());
-  std::ranges::stable_sort(loops, std::greater<>(), [&](const BoundaryLoop& loop) { return length_of(disk, loop); });
+  std::ranges::stable_sort(loops, std::greater<>(),
+                           [&](const BoundaryLoop& loop) { return length_of(disk, loop); });
   return loops;
 }
 
-/// Cutting a surface along shortest paths from source to source leaves a disk. Each such path consists of two paths of
-/// the forest of shortest paths and one edge between them, which closes it; these edges are returned. They are the
-/// edges that are neither in the forest nor crossed by a spanning tree of the faces, which takes the edges of the
-/// longest paths first. With one vertex as the source the paths are loops (Erickson and Whittlesey, "Greedy optimal
-/// homotopy and homology generators", 2005), with the boundaries as sources arcs between them.
+/// Cutting a surface along shortest paths from source to source leaves a disk. Each such path consists of two
+/// paths of the forest of shortest paths and one edge between them, which closes it; these edges are
+/// returned. They are the edges that are neither in the forest nor crossed by a spanning tree of the faces,
+/// which takes the edges of the longest paths first. With one vertex as the source the paths are loops
+/// (Erickson and Whittlesey, "Greedy optimal homotopy and homology generators", 2005), with the boundaries as
+/// sources arcs between them.
 std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& distances) {
   struct Candidate {
     double length;
@@ -118,10 +123,12 @@ std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& dista
     for (std::uint8_t s = 0; s < 3; ++s) {
       const TriangleSide side{f, s}, across = disk.neighbors()[f][s];
       if (across == kNoSide || across.triangle < f || (across.triangle == f && across.side < s)) continue;
-      const TriangleSide to_from = distances.last_side[disk.from(side)], to_to = distances.last_side[disk.to(side)];
+      const TriangleSide to_from = distances.last_side[disk.from(side)],
+                         to_to = distances.last_side[disk.to(side)];
       if (to_from == side || to_from == across || to_to == side || to_to == across) continue;
       candidates.push_back(
-          {distances.to_vertex[disk.from(side)] + distances.to_vertex[disk.to(side)] + disk.length(side), side});
+          {distances.to_vertex[disk.from(side)] + distances.to_vertex[disk.to(side)] + disk.length(side),
+           side});
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.length > b.length; });
@@ -134,8 +141,8 @@ std::vector<TriangleSide> closing_edges(const Disk& disk, const Distances& dista
   return closing;
 }
 
-/// The closing edges and the paths from both ends of each to a source. With a single source, without the stem that all
-/// loops share.
+/// The closing edges and the paths from both ends of each to a source. With a single source, without the stem
+/// that all loops share.
 std::vector<TriangleSide> cut_graph(const Disk& disk, const Distances& distances,
                                     const std::vector<char>& is_boundary) {
   std::vector<TriangleSide> cut = closing_edges(disk, distances);
@@ -169,7 +176,8 @@ std::vector<char> boundary_vertices(const Disk& disk) {
   std::vector<char> is_boundary(disk.positions().size(), 0);
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s)
-      if (disk.neighbors()[f][s] == kNoSide) is_boundary[disk.from({f, s})] = is_boundary[disk.to({f, s})] = 1;
+      if (disk.neighbors()[f][s] == kNoSide)
+        is_boundary[disk.from({f, s})] = is_boundary[disk.to({f, s})] = 1;
   return is_boundary;
 }
 
@@ -235,7 +243,8 @@ std::vector<std::uint32_t> vertices_at(const Disk& disk, const BoundaryLoop& loo
                                        const std::vector<Eigen::Vector3d>& places) {
   std::vector<std::uint32_t> vertices;
   for (const TriangleSide s : loop)
-    if (std::ranges::find(places, disk.positions()[disk.from(s)]) != places.end()) vertices.push_back(disk.from(s));
+    if (std::ranges::find(places, disk.positions()[disk.from(s)]) != places.end())
+      vertices.push_back(disk.from(s));
   return vertices;
 }
 
@@ -247,8 +256,8 @@ void refine_for_map(Disk& disk, double area_share) {
   split_towards_delaunay(disk, static_cast<std::size_t>(most));
 }
 
-/// Where the boundary loop shall begin, and the corners of the shape, as positions: vertices change their numbers when
-/// cuts are opened.
+/// Where the boundary loop shall begin, and the corners of the shape, as positions: vertices change their
+/// numbers when cuts are opened.
 struct Marks {
   std::vector<Eigen::Vector3d> forks;
   std::optional<TriangleSide> start;
@@ -279,7 +288,8 @@ void fill_shorter_loops(Disk& disk, std::size_t max_holes) {
 
 BoundaryLoop loop_from(const Disk& disk, std::uint32_t vertex) {
   BoundaryLoop loop = std::move(boundary_loops(disk.neighbors()).front());
-  const auto first = std::find_if(loop.begin(), loop.end(), [&](TriangleSide s) { return disk.from(s) == vertex; });
+  const auto first =
+      std::find_if(loop.begin(), loop.end(), [&](TriangleSide s) { return disk.from(s) == vertex; });
   std::rotate(loop.begin(), first, loop.end());
   return loop;
 }
@@ -316,7 +326,8 @@ bool extend_cut(CutDisk& cut, const std::vector<std::uint32_t>& vertices) {
   std::vector<std::uint32_t> sources;
   for (const TriangleSide s : cut.outer) sources.push_back(cut.disk.from(s));
   const Distances distances = distances_from(sources, cut.disk, Arcs(cut.disk));
-  const auto deepest = std::ranges::max_element(vertices, {}, [&](std::uint32_t v) { return distances.to_vertex[v]; });
+  const auto deepest =
+      std::ranges::max_element(vertices, {}, [&](std::uint32_t v) { return distances.to_vertex[v]; });
   if (deepest == vertices.end() || !(distances.to_vertex[*deepest] > 0)) return false;
   const std::vector<TriangleSide> path = path_to_source(cut.disk, distances, *deepest);
   Marks marks;

@@ -7,7 +7,8 @@
 
 namespace hilbrush {
 
-Disk::Disk(const TexturedMesh& mesh, const Neighbors& neighbors, const std::vector<std::uint32_t>& triangles) {
+Disk::Disk(const TexturedMesh& mesh, const Neighbors& neighbors,
+           const std::vector<std::uint32_t>& triangles) {
   const auto side_of = [&](TriangleSide other) {
     const auto at = std::lower_bound(triangles.begin(), triangles.end(), other.triangle);
     if (at == triangles.end() || *at != other.triangle) return kNoSide;
@@ -38,7 +39,8 @@ std::uint32_t Disk::split_edge(TriangleSide s, double share) {
   const auto middle = static_cast<std::uint32_t>(positions_.size());
   positions_.push_back((1 - share) * positions_[from(s)] + share * positions_[to(s)]);
   const TriangleSide across = neighbors_[s.triangle][s.side];
-  // Cuts one face from the middle of a side to its apex: it keeps the first half, a new face takes the second.
+  // Cuts one face from the middle of a side to its apex: it keeps the first half, a new face takes the
+  // second.
   const auto halve = [&](TriangleSide side, double f_share) {
     const auto [f, i] = side;
     const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;

@@ -7,8 +7,8 @@
 #include "sampling/model/edges.h"
 #include "sampling/model/textured_mesh.h"
 
-/// A component before it is mapped to the square: its triangles as faces that may be split, cut apart and complemented.
-/// Every face records which part of which mesh triangle it is.
+/// A component before it is mapped to the square: its triangles as faces that may be split, cut apart and
+/// complemented. Every face records which part of which mesh triangle it is.
 namespace hilbrush {
 
 /// The part of a mesh triangle that a face covers; faces that only fill a hole have kNoTriangle.

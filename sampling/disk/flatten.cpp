@@ -21,7 +21,9 @@ std::array<Eigen::Vector3d, 4> corner_positions(const CutDisk& cut, const Square
                                                Eigen::Vector2d(width, 1), Eigen::Vector2d(0, 1)};
   std::array<Eigen::Vector3d, 4> positions;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto distance2 = [&](TriangleSide s) { return (map.places[cut.disk.from(s)] - corners[k]).squaredNorm(); };
+    const auto distance2 = [&](TriangleSide s) {
+      return (map.places[cut.disk.from(s)] - corners[k]).squaredNorm();
+    };
     positions[k] = cut.disk.positions()[cut.disk.from(*std::ranges::min_element(cut.outer, {}, distance2))];
   }
   return positions;
@@ -42,7 +44,8 @@ FlatPiece make_piece(const CutDisk& cut, const SquareMap& map) {
   return piece;
 }
 
-/// The two halves of a component: the triangles nearer to one of two far ends, along paths over triangles' centers.
+/// The two halves of a component: the triangles nearer to one of two far ends, along paths over triangles'
+/// centers.
 std::array<std::vector<std::uint32_t>, 2> halves(const TexturedMesh& mesh, const Neighbors& neighbors,
                                                  const std::vector<std::uint32_t>& triangles) {
   const auto n = static_cast<std::uint32_t>(triangles.size());
@@ -103,7 +106,8 @@ class Flattening {
     // Where all triangles' centers fall onto one point there are no far ends.
     if (two_halves[0].empty() || two_halves[1].empty()) return add_in_space(component);
     is_divided_ = true;
-    for (const auto& triangles : two_halves) add(describe_component(mesh_, neighbors_, triangles), divisions - 1);
+    for (const auto& triangles : two_halves)
+      add(describe_component(mesh_, neighbors_, triangles), divisions - 1);
   }
 
   void add_in_space(const Component& component) {
@@ -148,7 +152,8 @@ class Flattening {
 
 }  // namespace
 
-std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh, const std::vector<std::uint32_t>& triangles) {
+std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh,
+                                           const std::vector<std::uint32_t>& triangles) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
   const auto for_each_vertex = [&](auto visit) {
     for (const auto t : triangles)

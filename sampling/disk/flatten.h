@@ -5,8 +5,8 @@
 
 #include "sampling/disk/components.h"
 
-/// From a component of the mesh to squares that curves can walk: cut, map, and, where no map of the whole is valid,
-/// divide.
+/// From a component of the mesh to squares that curves can walk: cut, map, and, where no map of the whole is
+/// valid, divide.
 namespace hilbrush {
 
 /// A face on the square, and the part of a mesh triangle that it covers.
@@ -19,9 +19,10 @@ struct FlatFace {
 struct FlatPiece {
   std::vector<FlatFace> faces;  ///< counter-clockwise on the square ...
   int square_count = 1;
-  std::vector<std::uint32_t> triangles_in_space;  ///< ... or, if no valid map was found: to be ordered in space
-  /// Where on the surface the corners of the row of squares lie (or near which points of it those of its bounding box):
-  /// lower left, lower right, upper right, upper left.
+  std::vector<std::uint32_t>
+      triangles_in_space;  ///< ... or, if no valid map was found: to be ordered in space
+  /// Where on the surface the corners of the row of squares lie (or near which points of it those of its
+  /// bounding box): lower left, lower right, upper right, upper left.
   std::array<Eigen::Vector3d, 4> corners_O;
 
   bool is_mapped() const { return triangles_in_space.empty(); }
@@ -39,10 +40,12 @@ struct FlatComponent {
 };
 
 /// The vertices nearest to the lower four corners of the box around some triangles.
-std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh, const std::vector<std::uint32_t>& triangles);
+std::array<Eigen::Vector3d, 4> box_corners(const TexturedMesh& mesh,
+                                           const std::vector<std::uint32_t>& triangles);
 
-/// `area_share` of the whole mesh's surface decides how much the component may be refined. Deterministic, may be called
-/// from several threads. Cost as cut_to_disk and map_to_square; a few times that for a component that must be divided.
+/// `area_share` of the whole mesh's surface decides how much the component may be refined. Deterministic, may
+/// be called from several threads. Cost as cut_to_disk and map_to_square; a few times that for a component
+/// that must be divided.
 FlatComponent flatten(const TexturedMesh& mesh, const Neighbors& neighbors, const Component& component,
                       double area_share);
 

@@ -72,7 +72,8 @@ void split_most_urgent(Disk& disk, std::size_t face_count, Urgency urgency, Shar
   }
 }
 
-/// The corner opposite to a side: its angle as cosine and sine (unscaled), and the foot of its height along the side.
+/// The corner opposite to a side: its angle as cosine and sine (unscaled), and the foot of its height along
+/// the side.
 struct Apex {
   double cosine, sine, foot;
 
@@ -86,7 +87,8 @@ struct Apex {
   }
 };
 
-/// How far below 0 the cotan weight of an edge is, times its length squared: what clamping it does to the map's energy.
+/// How far below 0 the cotan weight of an edge is, times its length squared: what clamping it does to the
+/// map's energy.
 double negative_energy(const Disk& disk, TriangleSide s) {
   const Apex here(disk, s);
   double cotans = here.cosine / std::max(here.sine, kMinSine * std::abs(here.cosine));

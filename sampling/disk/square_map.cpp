@@ -59,20 +59,23 @@ struct SquareBoundary {
 
   std::vector<char> on_sides(std::uint8_t which) const {
     std::vector<char> is_on(sides.size());
-    std::ranges::transform(sides, is_on.begin(), [&](std::uint8_t s) { return static_cast<char>((s & which) != 0); });
+    std::ranges::transform(sides, is_on.begin(),
+                           [&](std::uint8_t s) { return static_cast<char>((s & which) != 0); });
     return is_on;
   }
 };
 
 /// Between corners by `measure`, see boundary_measure().
-SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const std::vector<double>& measure) {
+SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners,
+                              const std::vector<double>& measure) {
   const std::array<Vector2d, 4> square{Vector2d(0, 0), Vector2d(1, 0), Vector2d(1, 1), Vector2d(0, 1)};
   SquareBoundary boundary;
   boundary.places.assign(cut.disk.positions().size(), Vector2d(.5, .5));
   boundary.sides.assign(cut.disk.positions().size(), 0);
   const std::size_t n = cut.outer.size();
   for (std::size_t k = 0; k < 4; ++k) {
-    const std::size_t begin = corners[k], end = corners[(k + 1) % 4] + (corners[(k + 1) % 4] <= begin ? n : 0);
+    const std::size_t begin = corners[k],
+                      end = corners[(k + 1) % 4] + (corners[(k + 1) % 4] <= begin ? n : 0);
     const auto at = [&](std::size_t i) { return measure[i % n] + (i >= n ? measure.back() : 0); };
     const Vector2d& from = square[k];
     const Vector2d& to = square[(k + 1) % 4];
@@ -86,14 +89,15 @@ SquareBoundary place_boundary(const CutDisk& cut, const Corners& corners, const 
   return boundary;
 }
 
-/// An inner edge between two vertices on one side of the square would be mapped onto that side, with all that it cuts
-/// off.
+/// An inner edge between two vertices on one side of the square would be mapped onto that side, with all that
+/// it cuts off.
 void split_chords(Disk& disk, SquareBoundary& boundary) {
   // The loop also visits the faces that splitting adds: they take over sides of the old ones.
   for (std::uint32_t f = 0; f < disk.faces().size(); ++f)
     for (std::uint8_t s = 0; s < 3; ++s) {
       const TriangleSide side{f, s};
-      if (disk.neighbors()[f][s] == kNoSide || (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
+      if (disk.neighbors()[f][s] == kNoSide ||
+          (boundary.sides[disk.from(side)] & boundary.sides[disk.to(side)]) == 0)
         continue;
       disk.split_edge(side);
       boundary.places.emplace_back(.5, .5);
@@ -102,7 +106,8 @@ void split_chords(Disk& disk, SquareBoundary& boundary) {
 }
 
 /// Squared stretches of the map of a face, from the surface to the square, larger one first.
-std::array<double, 2> squared_stretches(const Disk& disk, const Triangle& face, const std::vector<Vector2d>& places) {
+std::array<double, 2> squared_stretches(const Disk& disk, const Triangle& face,
+                                        const std::vector<Vector2d>& places) {
   const Vector3d p = disk.positions()[face[1]] - disk.positions()[face[0]];
   const Vector3d q = disk.positions()[face[2]] - disk.positions()[face[0]];
   const double height = p.cross(q).norm() / p.norm();
@@ -145,12 +150,13 @@ double energy(const WeightedGraph& graph, const Eigen::VectorXd& values) {
   return sum;
 }
 
-/// Rows of (x, y) on the unit square, stretched to a row of squares, and turned by a right angle if it stands upright.
+/// Rows of (x, y) on the unit square, stretched to a row of squares, and turned by a right angle if it stands
+/// upright.
 std::vector<Vector2d> places_of(const Eigen::MatrixXd& values, double width, bool is_upright) {
   std::vector<Vector2d> places(static_cast<std::size_t>(values.rows()));
   for (Eigen::Index v = 0; v < values.rows(); ++v)
-    places[static_cast<std::size_t>(v)] =
-        is_upright ? Vector2d(width * values(v, 1), 1 - values(v, 0)) : Vector2d(width * values(v, 0), values(v, 1));
+    places[static_cast<std::size_t>(v)] = is_upright ? Vector2d(width * values(v, 1), 1 - values(v, 0))
+                                                     : Vector2d(width * values(v, 0), values(v, 1));
   return places;
 }
 
@@ -159,7 +165,9 @@ struct MapTrial {
   std::optional<SquareMap> best;
   std::vector<std::uint32_t> flipped;  ///< vertices of the flipped faces of the last map that had any
 
-  explicit MapTrial(CutDisk& c) : cut_(c), along_(lengths_along(cut_)) { set_corners(choose_corners(cut_, along_)); }
+  explicit MapTrial(CutDisk& c) : cut_(c), along_(lengths_along(cut_)) {
+    set_corners(choose_corners(cut_, along_));
+  }
 
   void fix_boundary() {
     Eigen::MatrixXd values = boundary_places_;
@@ -168,7 +176,8 @@ struct MapTrial {
     take(places_of(values, square_count_, false), square_count_);
   }
 
-  /// Moves corners so that a slit becomes a whole number of squares, by what the map with a fixed boundary says.
+  /// Moves corners so that a slit becomes a whole number of squares, by what the map with a fixed boundary
+  /// says.
   void fit_corners() {
     if (const auto corners = corners_for_whole_squares(cut_, along_, modulus_)) set_corners(*corners);
   }
@@ -248,7 +257,8 @@ std::optional<SquareMap> map_to_square(CutDisk& cut) {
     trial.fit_corners();
     trial.slide_boundary();
     if (trial.best) return trial.best;
-    // Flipped faces: there the map has shrunk a part to nothing, and its places differ in their last digits only.
+    // Flipped faces: there the map has shrunk a part to nothing, and its places differ in their last digits
+    // only.
     const bool is_better = trial.flipped.size() < most_flipped;
     most_flipped = static_cast<std::size_t>(kMaxFlippedLeft * static_cast<double>(trial.flipped.size()));
     if (is_better && extensions < kMaxExtensions && extend_cut(cut, trial.flipped)) continue;

@@ -11,8 +11,8 @@ namespace hilbrush {
 struct Dot {
   Eigen::Vector3d position_O;       ///< meters, on the surface
   Eigen::Vector3f normal_O;         ///< unit, of the dot's triangle
-  Eigen::Vector3f smooth_normal_O;  ///< unit, interpolated between vertices over smooth edges; what "near the normal"
-                                    ///< is measured against
+  Eigen::Vector3f smooth_normal_O;  ///< unit, interpolated between vertices over smooth edges; what "near the
+                                    ///< normal" is measured against
   std::uint32_t triangle = 0;
   std::uint32_t component = 0;  ///< index into SampleReport::components
   float tone = 0;               ///< wanted coverage at the dot, before the tone curve, 0..1

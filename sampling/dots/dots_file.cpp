@@ -19,7 +19,8 @@ constexpr std::size_t kRowsAtOnce = 4096;
 std::string header(double pitch_m, std::uint64_t dot_count, std::span<const std::string> reason_names) {
   std::ostringstream out;
   out.precision(12);
-  out << "ply\nformat binary_little_endian 1.0\ncomment dots of Hilbrush in painting order; meters, object frame\n"
+  out << "ply\nformat binary_little_endian 1.0\ncomment dots of Hilbrush in painting order; meters, object "
+         "frame\n"
       << "comment pitch_m " << pitch_m << '\n';
   for (std::size_t code = 0; code < reason_names.size(); ++code)
     out << "comment reason " << code << ' ' << reason_names[code] << '\n';

@@ -7,12 +7,13 @@
 
 #include "sampling/dots/dots.h"
 
-/// Dots as a file for viewers: binary little-endian PLY, opens in MeshLab, CloudCompare and Open3D as a point cloud.
+/// Dots as a file for viewers: binary little-endian PLY, opens in MeshLab, CloudCompare and Open3D as a point
+/// cloud.
 namespace hilbrush {
 
-/// A file of a known number of dots that is written as they come: element `vertex` with x y z (meters, frame O), nx ny
-/// nz, tone, level, component, reason; comments in the header give the name of each reason's code and the pitch.
-/// Memory: one block of rows.
+/// A file of a known number of dots that is written as they come: element `vertex` with x y z (meters, frame
+/// O), nx ny nz, tone, level, component, reason; comments in the header give the name of each reason's code
+/// and the pitch. Memory: one block of rows.
 class DotsFile {
  public:
   /// @throws InputError naming the file if it cannot be opened for writing.

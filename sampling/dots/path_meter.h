@@ -26,7 +26,8 @@ struct SampleReport {
   std::vector<ComponentPath> components;      ///< as SurfaceCurve::components(); empty for laminar slices
 };
 
-/// Measures the path along dots that come one after another: of all, and within each component that the report lists.
+/// Measures the path along dots that come one after another: of all, and within each component that the
+/// report lists.
 class PathMeter {
  public:
   /// Keeps a reference to `report` and sets its counts and lengths back to zero.

@@ -139,7 +139,8 @@ DotSequence read_dots(const std::filesystem::path& file) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error || header.count > size / header.row_bytes)
-    throw InputError(file.string(), "is too short for the " + std::to_string(header.count) + " dots it announces");
+    throw InputError(file.string(),
+                     "is too short for the " + std::to_string(header.count) + " dots it announces");
 
   const auto find = [&](const char* name) { return header.find(name); };
   const std::array position{find("x"), find("y"), find("z")}, normal{find("nx"), find("ny"), find("nz")};
@@ -158,7 +159,8 @@ DotSequence read_dots(const std::filesystem::path& file) {
       dot.position_O[k] = value(position[static_cast<std::size_t>(k)], 0);
       dot.normal_O[k] = static_cast<float>(value(normal[static_cast<std::size_t>(k)], 0));
     }
-    if (!dot.position_O.allFinite()) throw InputError(file.string(), "has a dot whose position is not finite");
+    if (!dot.position_O.allFinite())
+      throw InputError(file.string(), "has a dot whose position is not finite");
     dot.smooth_normal_O = dot.normal_O;
     dot.tone = static_cast<float>(value(tone, 0));
     dot.level = static_cast<float>(value(level, 1));

@@ -8,17 +8,17 @@
 
 /// Places sorted into cubes, to find those around a place.
 ///
-/// There are three such grids because their demands differ: this one holds a fixed set in single precision and keeps
-/// each cube's places side by side (what `fine` reads in its inner loop); DotGrid (sampling/gaps) takes in new dots
-/// between look-ups and searches to any distance; touching balls (sampling/blue) differ in size by orders of magnitude,
-/// so each octave of radius has its own side. They also visit places in different orders, and sums of floating-point
-/// numbers depend on that order.
+/// There are three such grids because their demands differ: this one holds a fixed set in single precision
+/// and keeps each cube's places side by side (what `fine` reads in its inner loop); DotGrid (sampling/gaps)
+/// takes in new dots between look-ups and searches to any distance; touching balls (sampling/blue) differ in
+/// size by orders of magnitude, so each octave of radius has its own side. They also visit places in
+/// different orders, and sums of floating-point numbers depend on that order.
 namespace hilbrush {
 
 class CubeGrid {
  public:
-  /// Cost O(n log n); the same grid for any number of threads. Two million sides (2^21) apart cubes share a key, so
-  /// their places are visited together: callers compare distances.
+  /// Cost O(n log n); the same grid for any number of threads. Two million sides (2^21) apart cubes share a
+  /// key, so their places are visited together: callers compare distances.
   CubeGrid(std::span<const Eigen::Vector3f> places, float side_m);
 
   std::size_t cube_count() const { return cubes_.size(); }
@@ -27,8 +27,8 @@ class CubeGrid {
     return {order_.data() + cubes_[cube].begin, cubes_[cube].end - cubes_[cube].begin};
   }
 
-  /// Visits the index of each place in the 27 cubes about that of `center`: a superset of those within one side of it,
-  /// always in the same order.
+  /// Visits the index of each place in the 27 cubes about that of `center`: a superset of those within one
+  /// side of it, always in the same order.
   template <class Visit>
   void visit_around(const Eigen::Vector3f& center, Visit visit) const {
     const Coordinates middle = coordinates_of(center);
@@ -57,7 +57,8 @@ class CubeGrid {
     constexpr int kBits = 21;
     std::uint64_t key = 0;
     for (int k = 0; k < 3; ++k)
-      key = key << kBits | (static_cast<std::uint64_t>(c[static_cast<std::size_t>(2 - k)]) & ((1u << kBits) - 1));
+      key = key << kBits |
+            (static_cast<std::uint64_t>(c[static_cast<std::size_t>(2 - k)]) & ((1u << kBits) - 1));
     return key;
   }
   std::size_t slot_of(std::uint64_t key) const {

@@ -18,21 +18,22 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// Length of a dot's step in the first and the last pass, in pitches; in between it falls along half a cosine wave.
+/// Length of a dot's step in the first and the last pass, in pitches; in between it falls along half a cosine
+/// wave.
 constexpr float kFirstStepPitches = .5f;
 constexpr float kLastStepPitches = .03f;
 /// Passes before the averages of the gradients can be trusted; until then steps are shorter.
 constexpr int kWarmUpPasses = 4;
-/// Weight of the old value in the running averages of a dot's gradient and of its square: beta1 and beta2 of Adam,
-/// shorter than its .9 and .999 because there are only a few dozen passes.
+/// Weight of the old value in the running averages of a dot's gradient and of its square: beta1 and beta2 of
+/// Adam, shorter than its .9 and .999 because there are only a few dozen passes.
 constexpr float kMomentum = .8f;
 constexpr float kSteepness = .95f;
-/// Steps are divided by at least this share of the rms gradient of all dots, so that a dot whose own gradient is
-/// smaller hardly moves.
+/// Steps are divided by at least this share of the rms gradient of all dots, so that a dot whose own gradient
+/// is smaller hardly moves.
 constexpr float kCommonShare = .5f;
 
-/// Gradient descent with momentum, each dot's step divided by the running rms of its own gradient (Kingma and Ba,
-/// "Adam", 2015; one scale for all directions, so that no direction is preferred).
+/// Gradient descent with momentum, each dot's step divided by the running rms of its own gradient (Kingma and
+/// Ba, "Adam", 2015; one scale for all directions, so that no direction is preferred).
 class Descent {
  public:
   Descent(const SurfaceCurve& curve, const ToneField& tone, const DotSequence& dots, const SpotModel& spot)
@@ -92,8 +93,8 @@ class Descent {
 
 }  // namespace
 
-DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots, const SpotModel& spot,
-                        const FineOptions& options, const Progress& progress) {
+DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots,
+                        const SpotModel& spot, const FineOptions& options, const Progress& progress) {
   CHECK(&curve.mesh() == &tone.mesh());
   if (!(spot.radius_m > 0) || !std::isfinite(spot.radius_m))
     throw InputError("", "the laser spot must be more than 0 mm wide");
@@ -115,8 +116,9 @@ DotSequence refine_dots(const SurfaceCurve& curve, const ToneField& tone, DotSeq
   tbb::parallel_for(std::size_t{0}, best_places.size(), [&](std::size_t i) {
     const SurfacePlace& place = best_places[i];
     const float level = dots.dots[i].level;
-    dots.dots[i] = make_dot(curve.surface(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
-                            place.component);
+    dots.dots[i] =
+        make_dot(curve.surface(), tone, surface_point_at(curve.mesh(), place.triangle, place.position_O),
+                 place.component);
     dots.dots[i].level = level;
   });
   return dots;

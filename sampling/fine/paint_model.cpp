@@ -17,25 +17,27 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// Nodes for each pitch squared of surface. With six, the nodes themselves limited pictures above 32 dB (tests/bench).
+/// Nodes for each pitch squared of surface. With six, the nodes themselves limited pictures above 32 dB
+/// (tests/bench).
 constexpr double kNodesPerPitch2 = 9;
-/// At most this many nodes form a blob: consecutive nodes within one pitch of its first, whose normals are within about
-/// 45 degrees of its first one's.
+/// At most this many nodes form a blob: consecutive nodes within one pitch of its first, whose normals are
+/// within about 45 degrees of its first one's.
 constexpr std::uint32_t kMaxBlobNodes = 6;
 constexpr float kMinBlobCosine = .7f;
-/// As in the film (sim/film/film_lattice.h): the light of a spot ends at this many of its radii, and faces that it
-/// meets at a smaller cosine of incidence get none.
+/// As in the film (sim/film/film_lattice.h): the light of a spot ends at this many of its radii, and faces
+/// that it meets at a smaller cosine of incidence get none.
 constexpr float kSpotCutRadii = 1.7f;
 constexpr float kGrazingCosine = .02f;
-/// Light reaches this far along the beam, in cut radii, so that a wall shields what is behind it. Half of what the film
-/// allows, which must also hold for oblique light.
+/// Light reaches this far along the beam, in cut radii, so that a wall shields what is behind it. Half of
+/// what the film allows, which must also hold for oblique light.
 constexpr float kDepthWindow = 1;
-/// Variance of the blur in pitches squared. The error is blurred by a Gaussian of one pitch, and its gradient needs the
-/// same blur again: together one Gaussian of sqrt(2) pitches.
+/// Variance of the blur in pitches squared. The error is blurred by a Gaussian of one pitch, and its gradient
+/// needs the same blur again: together one Gaussian of sqrt(2) pitches.
 constexpr float kBlurVariancePitches2 = 2;
 /// The blur ends at this many of its standard deviations.
 constexpr float kBlurCutSigmas = 2.5f;
-/// The coverage is tabulated for doses up to kDoseSteps / kStepsPerFullDose = 8 times the dose of an even full tone.
+/// The coverage is tabulated for doses up to kDoseSteps / kStepsPerFullDose = 8 times the dose of an even
+/// full tone.
 constexpr std::size_t kDoseSteps = 4096;
 constexpr float kStepsPerFullDose = 512;
 
@@ -51,12 +53,14 @@ ToneField even_gray(const TexturedMesh& mesh) {
 
 }  // namespace
 
-PaintModel::PaintModel(const SurfaceCurve& curve, const ToneField& tone, double pitch_m, const SpotModel& spot)
+PaintModel::PaintModel(const SurfaceCurve& curve, const ToneField& tone, double pitch_m,
+                       const SpotModel& spot)
     : pitch_m_(pitch_m), spot_radius_m_(static_cast<float>(spot.radius_m)) {
   const auto [low, high] = bounds(curve.mesh());
   middle_O_ = .5 * (low + high);
   const double inside = 1 - std::exp(-2 * static_cast<double>(kSpotCutRadii * kSpotCutRadii));
-  peak_dose_ = static_cast<float>(2 * pitch_m * pitch_m / (std::numbers::pi * spot.radius_m * spot.radius_m * inside));
+  peak_dose_ =
+      static_cast<float>(2 * pitch_m * pitch_m / (std::numbers::pi * spot.radius_m * spot.radius_m * inside));
   tabulate(spot);
   place_nodes(curve, tone);
   gather_blobs();
@@ -67,7 +71,8 @@ PaintModel::PaintModel(const SurfaceCurve& curve, const ToneField& tone, double 
 void PaintModel::tabulate(const SpotModel& spot) {
   coverage_.resize(kDoseSteps + 1);
   for (std::size_t i = 0; i <= kDoseSteps; ++i)
-    coverage_[i] = static_cast<float>(spot.coverage(static_cast<double>(i) / static_cast<double>(kStepsPerFullDose)));
+    coverage_[i] =
+        static_cast<float>(spot.coverage(static_cast<double>(i) / static_cast<double>(kStepsPerFullDose)));
   coverage_slope_.resize(kDoseSteps);
   for (std::size_t i = 0; i < kDoseSteps; ++i)
     coverage_slope_[i] = (coverage_[i + 1] - coverage_[i]) * kStepsPerFullDose;
@@ -76,8 +81,8 @@ void PaintModel::tabulate(const SpotModel& spot) {
 void PaintModel::place_nodes(const SurfaceCurve& curve, const ToneField& tone) {
   const ToneField gray = even_gray(curve.mesh());
   SampleOptions options;
-  options.dot_count =
-      std::max<std::uint64_t>(1, std::llround(kNodesPerPitch2 * curve.mesh().area_m2() / (pitch_m_ * pitch_m_)));
+  options.dot_count = std::max<std::uint64_t>(
+      1, std::llround(kNodesPerPitch2 * curve.mesh().area_m2() / (pitch_m_ * pitch_m_)));
   options.dot_limit = std::numeric_limits<std::uint32_t>::max();
   const DotSequence nodes = place_dots(CurveMass(curve, gray), options);
   const std::size_t count = nodes.dots.size();
@@ -90,7 +95,8 @@ void PaintModel::place_nodes(const SurfaceCurve& curve, const ToneField& tone) {
     const Dot& node = nodes.dots[i];
     places_[i] = place_of(node.position_O);
     normals_[i] = node.normal_O;
-    wanted_[i] = static_cast<float>(tone.wanted(surface_point_at(curve.mesh(), node.triangle, node.position_O)));
+    wanted_[i] =
+        static_cast<float>(tone.wanted(surface_point_at(curve.mesh(), node.triangle, node.position_O)));
   });
 }
 
@@ -144,11 +150,13 @@ void PaintModel::collect_dose(std::span<const Exposure> exposures) {
                       for (std::size_t b = range.begin(); b < range.end(); ++b) {
                         near.clear();
                         dots.visit_around(blobs_[b].place, [&](std::uint32_t dot) {
-                          if ((places[dot] - blobs_[b].place).squaredNorm() < reach_m * reach_m) near.push_back(dot);
+                          if ((places[dot] - blobs_[b].place).squaredNorm() < reach_m * reach_m)
+                            near.push_back(dot);
                         });
                         for (std::uint32_t node = blobs_[b].begin; node < blobs_[b].end; ++node) {
                           dose_[node] = 0;
-                          for (const std::uint32_t dot : near) dose_[node] += dose_at(exposures[dot], node).dose;
+                          for (const std::uint32_t dot : near)
+                            dose_[node] += dose_at(exposures[dot], node).dose;
                         }
                       }
                     });
@@ -158,9 +166,10 @@ void PaintModel::link_blobs() {
   const auto pitch = static_cast<float>(pitch_m_);
   const float sigma2 = kBlurVariancePitches2 * pitch * pitch;
   const float cut2 = kBlurCutSigmas * kBlurCutSigmas * sigma2;
-  // A node stands for 1 / kNodesPerPitch2 of a pitch squared, so the kernel's weights sum to 1 over the nodes.
-  const auto scale =
-      static_cast<float>(1 / (2 * std::numbers::pi * static_cast<double>(kBlurVariancePitches2) * kNodesPerPitch2));
+  // A node stands for 1 / kNodesPerPitch2 of a pitch squared, so the kernel's weights sum to 1 over the
+  // nodes.
+  const auto scale = static_cast<float>(
+      1 / (2 * std::numbers::pi * static_cast<double>(kBlurVariancePitches2) * kNodesPerPitch2));
   std::vector<Vector3f> places;
   for (const Blob& blob : blobs_) places.push_back(blob.place);
   const CubeGrid grid(places, kBlurCutSigmas * std::sqrt(sigma2));
@@ -218,8 +227,8 @@ double PaintModel::expose(std::span<const Exposure> exposures) {
   tbb::parallel_for(std::size_t{0}, blobs_.size(), [&](std::size_t b) {
     const Blob& blob = blobs_[b];
     for (std::uint32_t node = blob.begin; node < blob.end; ++node)
-      pull_[node] =
-          2 * (blob.blurred + blob.slope.dot(places_[node] - blob.place)) * coverage_slope_[step_of(dose_[node])];
+      pull_[node] = 2 * (blob.blurred + blob.slope.dot(places_[node] - blob.place)) *
+                    coverage_slope_[step_of(dose_[node])];
   });
   // With G the blur by one pitch and e the error: |G e|^2 = e . (G G e), as G is symmetric.
   double sum = 0;

@@ -8,23 +8,27 @@
 /// The painted picture as the sampler `fine` predicts it.
 namespace hilbrush {
 
-/// A coarse film of its own, because sampling does not use the simulator: nodes of equal area all over the surface,
-/// nine a pitch squared, placed along the same curve as the dots. The dose is exact at nodes (spots at normal
-/// incidence, cut off and kept from passing through thin walls as in sim/film/film_lattice.h). Errors are blurred
-/// between blobs of a few neighboring nodes, which is much cheaper than between nodes.
+/// A coarse film of its own, because sampling does not use the simulator: nodes of equal area all over the
+/// surface, nine a pitch squared, placed along the same curve as the dots. The dose is exact at nodes (spots
+/// at normal incidence, cut off and kept from passing through thin walls as in sim/film/film_lattice.h).
+/// Errors are blurred between blobs of a few neighboring nodes, which is much cheaper than between nodes.
 class PaintModel {
  public:
   PaintModel(const SurfaceCurve& curve, const ToneField& tone, double pitch_m, const SpotModel& spot);
 
   /// A dot as the paint receives it.
   struct Exposure {
-    Eigen::Vector3f place;   ///< relative to the middle of the mesh, in meters: single precision is enough there
+    Eigen::Vector3f
+        place;  ///< relative to the middle of the mesh, in meters: single precision is enough there
     Eigen::Vector3f normal;  ///< unit
     float level = 1;
   };
-  Eigen::Vector3f place_of(const Eigen::Vector3d& position_O) const { return (position_O - middle_O_).cast<float>(); }
+  Eigen::Vector3f place_of(const Eigen::Vector3d& position_O) const {
+    return (position_O - middle_O_).cast<float>();
+  }
 
-  /// Paints the picture from scratch. Returns the squared error of the blurred picture, averaged over the nodes.
+  /// Paints the picture from scratch. Returns the squared error of the blurred picture, averaged over the
+  /// nodes.
   double expose(std::span<const Exposure> exposures);
   /// Gradient of the squared error with respect to this dot's place.
   Eigen::Vector3f gradient(const Exposure& exposure) const;

@@ -6,17 +6,18 @@
 
 #include "sampling/dots/dots.h"
 
-/// Dots sorted into cells, to find the nearest one or all that are near. Dots may be added; look-ups are thread-safe
-/// between additions. Why this is not the grid of sampling/fine: see cube_grid.h.
+/// Dots sorted into cells, to find the nearest one or all that are near. Dots may be added; look-ups are
+/// thread-safe between additions. Why this is not the grid of sampling/fine: see cube_grid.h.
 namespace hilbrush {
 
-/// Normals with a smaller cosine between them (more than 104 degrees apart) belong to different sides of a wall.
+/// Normals with a smaller cosine between them (more than 104 degrees apart) belong to different sides of a
+/// wall.
 inline constexpr double kSameSide = -.25;
 
 class DotGrid {
  public:
-  /// Keeps a reference to `dots`; a new dot must be appended there before add(). `size_m` is the side of a cell: a few
-  /// pitches.
+  /// Keeps a reference to `dots`; a new dot must be appended there before add(). `size_m` is the side of a
+  /// cell: a few pitches.
   DotGrid(const std::vector<Dot>& dots, double size_m);
 
   /// Adds the dot with this index.
@@ -47,7 +48,8 @@ class DotGrid {
   void grow();
   /// Calls visit(dot, distance) for the dots of one cell.
   template <class Visit>
-  void visit_cell(const Cell& cell, const Eigen::Vector3d& place_O, const Eigen::Vector3f& normal_O, Visit visit) const;
+  void visit_cell(const Cell& cell, const Eigen::Vector3d& place_O, const Eigen::Vector3f& normal_O,
+                  Visit visit) const;
 
   const std::vector<Dot>& dots_;
   double size_;

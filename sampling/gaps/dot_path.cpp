@@ -17,7 +17,9 @@ DotPath::DotPath(const std::vector<Dot>& dots) : dots_(dots) {
 }
 
 double DotPath::growth(std::uint32_t before, std::uint32_t after, const Dot& dot) const {
-  const auto distance = [&](std::uint32_t i) { return i == kEnd ? 0 : (dots_[i].position_O - dot.position_O).norm(); };
+  const auto distance = [&](std::uint32_t i) {
+    return i == kEnd ? 0 : (dots_[i].position_O - dot.position_O).norm();
+  };
   const double removed =
       before == kEnd || after == kEnd ? 0 : (dots_[before].position_O - dots_[after].position_O).norm();
   return distance(before) + distance(after) - removed;

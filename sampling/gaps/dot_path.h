@@ -12,8 +12,8 @@ class DotPath {
   /// In the order of `dots`, to which it keeps a reference and to which new ones are appended.
   explicit DotPath(const std::vector<Dot>& dots);
 
-  /// Inserts the last of the dots before or after one of `nearby`, where the path grows least; at the end if `nearby`
-  /// is empty.
+  /// Inserts the last of the dots before or after one of `nearby`, where the path grows least; at the end if
+  /// `nearby` is empty.
   void insert_last(const std::vector<std::uint32_t>& nearby);
 
   /// The dots along the path.

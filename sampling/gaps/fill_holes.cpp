@@ -85,7 +85,8 @@ class HoleFilling {
       auto found = holes_on(s);
       holes.insert(holes.end(), found.begin(), found.end());
     }
-    std::stable_sort(holes.begin(), holes.end(), [](const auto& a, const auto& b) { return a.size > b.size; });
+    std::stable_sort(holes.begin(), holes.end(),
+                     [](const auto& a, const auto& b) { return a.size > b.size; });
     std::uint64_t added = 0;
     for (const GapMeter::Hole& hole : holes) added += fill(hole.point, slack_at(hole.point));
     return added;
@@ -172,8 +173,8 @@ class HoleFilling {
 
 }  // namespace
 
-DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots, double largest_gap_pitches,
-                       FillReport* report, const Progress& progress) {
+DotSequence fill_holes(const SurfaceCurve& curve, const ToneField& tone, DotSequence dots,
+                       double largest_gap_pitches, FillReport* report, const Progress& progress) {
   if (!(largest_gap_pitches >= kMinGapPitches))
     throw InputError("largest_gap", "must be at least .5 pitches: even a hexagonal grid has gaps of .62");
   FillReport result;

@@ -15,7 +15,8 @@ using Eigen::Vector3d;
 
 /// Samples of the tone over a disc for its mean.
 constexpr int kToneSamples = 24;
-/// The nearest dot is searched for up to this multiple of the allowed radius; larger holes count as that large.
+/// The nearest dot is searched for up to this multiple of the allowed radius; larger holes count as that
+/// large.
 constexpr double kMaxRadiusShare = 8;
 /// Pieces of a triangle are halved until their radius is this share of the largest gap there ...
 constexpr double kFinestPiece = .03;
@@ -24,7 +25,8 @@ constexpr double kOneTone = .25;
 
 }  // namespace
 
-GapMeter::GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m, double darkest)
+GapMeter::GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m,
+                   double darkest)
     : surface_(surface), tone_(tone), grid_(grid), limit_(limit_m), darkest_(darkest) {}
 
 double GapMeter::strictest_m() const {
@@ -97,16 +99,19 @@ void GapMeter::find_suspects(std::uint32_t triangle, std::vector<Suspect>& suspe
     waiting.pop_back();
     std::array<Vector3d, 3> places;
     for (std::size_t c = 0; c < 3; ++c) places[c] = place_of(corners[c]);
-    // A ball around the middle of the longest side or around the centroid holds the piece: the smaller one is used.
+    // A ball around the middle of the longest side or around the centroid holds the piece: the smaller one is
+    // used.
     std::size_t longest = 0;
     for (std::size_t side = 1; side < 3; ++side)
-      if ((places[(side + 1) % 3] - places[side]).norm() > (places[(longest + 1) % 3] - places[longest]).norm())
+      if ((places[(side + 1) % 3] - places[side]).norm() >
+          (places[(longest + 1) % 3] - places[longest]).norm())
         longest = side;
     const Vector3d middle_b = .5 * (corners[longest] + corners[(longest + 1) % 3]);
     const auto reach = [&](const Vector3d& from) {
       return std::max({(places[0] - from).norm(), (places[1] - from).norm(), (places[2] - from).norm()});
     };
-    const SurfacePoint centroid{triangle, (corners[0] + corners[1] + corners[2]) / 3}, middle{triangle, middle_b};
+    const SurfacePoint centroid{triangle, (corners[0] + corners[1] + corners[2]) / 3},
+        middle{triangle, middle_b};
     const double from_centroid = reach(position(surface_.mesh, centroid));
     const double from_middle = reach(position(surface_.mesh, middle));
     const bool is_centroid = from_centroid <= from_middle;

@@ -11,7 +11,8 @@ namespace hilbrush {
 class GapMeter {
  public:
   /// Keeps references. `limit_m` is the largest gap in meters at tone 1; `darkest` the largest asked tone.
-  GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m, double darkest);
+  GapMeter(const Surface& surface, const ToneField& tone, const DotGrid& grid, double limit_m,
+           double darkest);
 
   double limit_m() const { return limit_; }
   /// The largest gap allowed where the tone is darkest, in meters.
@@ -39,7 +40,8 @@ class GapMeter {
   /// Mean asked tone over the disc around a point.
   double mean_tone(const SurfacePoint& point, double radius_m) const;
   enum class Verdict { kCovered, kSuspect, kTooLarge };
-  Verdict judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& center, double radius_m) const;
+  Verdict judge(std::uint32_t triangle, const Corners& corners, const SurfacePoint& center,
+                double radius_m) const;
 
   const Surface& surface_;
   const ToneField& tone_;

@@ -53,7 +53,8 @@ std::optional<SquarePlaces::Place> SquarePlaces::place(const SurfacePoint& point
     const Vector3d weights = weights_in(chart.corners_b(face), b);
     if (weights.minCoeff() <= deepest) continue;
     deepest = weights.minCoeff();
-    best = {faces_[i].chart, weights[0] * face.places[0] + weights[1] * face.places[1] + weights[2] * face.places[2]};
+    best = {faces_[i].chart,
+            weights[0] * face.places[0] + weights[1] * face.places[1] + weights[2] * face.places[2]};
   }
   return best;
 }

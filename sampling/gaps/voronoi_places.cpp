@@ -6,7 +6,8 @@
 
 namespace hilbrush {
 
-std::vector<std::array<std::uint32_t, 3>> voronoi_triples(std::span<const Eigen::Vector2d> points, double width) {
+std::vector<std::array<std::uint32_t, 3>> voronoi_triples(std::span<const Eigen::Vector2d> points,
+                                                          double width) {
   const double steps = 0x1p30 / std::max(1., width);
   boost::polygon::voronoi_builder<std::int32_t> builder;
   for (const Eigen::Vector2d& p : points)

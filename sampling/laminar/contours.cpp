@@ -10,8 +10,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Where a plane crosses an edge of a triangle. Calculated from the vertex with the lower index, so that the triangles
-/// on both sides get the same place, to the last bit.
+/// Where a plane crosses an edge of a triangle. Calculated from the vertex with the lower index, so that the
+/// triangles on both sides get the same place, to the last bit.
 struct Crossing {
   std::uint64_t edge = 0;
   Vector3d b = Vector3d::Zero(), place;

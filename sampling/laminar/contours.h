@@ -24,8 +24,8 @@ struct Contour {
   bool is_closed = false;
 };
 
-/// Which triangles meet which of the planes z = lowest + (k + .5) * distance. Triangles in a plane meet none; a vertex
-/// on a plane counts as above it, so that contours of a closed surface are closed.
+/// Which triangles meet which of the planes z = lowest + (k + .5) * distance. Triangles in a plane meet none;
+/// a vertex on a plane counts as above it, so that contours of a closed surface are closed.
 class Slices {
  public:
   /// Keeps a reference to `mesh`. Cost O(triangles + pieces), 4 bytes a piece.
@@ -47,8 +47,9 @@ class Slices {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// Joins the pieces of one slice: open contours first, then closed ones, each in order of its first piece. Where more
-/// than two pieces meet on an edge (a surface that is not a manifold) contours end. Cost O(n log n).
+/// Joins the pieces of one slice: open contours first, then closed ones, each in order of its first piece.
+/// Where more than two pieces meet on an edge (a surface that is not a manifold) contours end. Cost O(n log
+/// n).
 std::vector<Contour> join(std::vector<ContourPiece> pieces);
 
 }  // namespace hilbrush

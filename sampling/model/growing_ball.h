@@ -16,9 +16,10 @@ class GrowingBall {
   GrowingBall(const TexturedMesh& mesh, const Neighbors& neighbors);
 
   void begin(const Eigen::Vector3d& center_O, std::uint32_t triangle);
-  /// The square of the smallest radius at which the ball contains a path along the surface from its center to the
-  /// triangle: the minimum, over all paths, of the greatest distance from the center at which the path crosses an edge.
-  /// Infinity if that is not less than `within2`. Cost O(k log k) over all calls, where k triangles meet the ball.
+  /// The square of the smallest radius at which the ball contains a path along the surface from its center to
+  /// the triangle: the minimum, over all paths, of the greatest distance from the center at which the path
+  /// crosses an edge. Infinity if that is not less than `within2`. Cost O(k log k) over all calls, where k
+  /// triangles meet the ball.
   double entry2(std::uint32_t triangle, double within2);
 
  private:

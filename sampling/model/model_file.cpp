@@ -24,7 +24,8 @@ bool starts_with(std::string_view text, std::string_view head) {
 /// OFF's first word may have letters before it for what the vertices have.
 bool is_off(std::string_view text) {
   const std::string_view word = text.substr(0, text.find_first_of(" \t\r\n#"));
-  return word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF" || word == "STCOFF";
+  return word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF" ||
+         word == "STCOFF";
 }
 
 /// The message for a kind of model that is known but not read, by its first bytes or ending; else empty.
@@ -32,7 +33,8 @@ std::string refusal_of(std::string_view text, const std::string& ending) {
   if (starts_with(text, "glTF") || ending == ".glb" || ending == ".gltf")
     return "this is a glTF model, which is not read; convert it to VRML 2.0, OBJ, PLY, OFF or STL";
   if (starts_with(text, "PK\x03\x04"))
-    return "this is a zip archive (3MF, perhaps), which is not read; convert it to VRML 2.0, OBJ, PLY, OFF or STL";
+    return "this is a zip archive (3MF, perhaps), which is not read; convert it to VRML 2.0, OBJ, PLY, OFF "
+           "or STL";
   if (starts_with(text, "#X3D") || ending == ".x3d" || ending == ".x3dv" || starts_with(text, "<?xml"))
     return "this is an XML or X3D model, which is not read; convert it to VRML 2.0, OBJ, PLY, OFF or STL";
   if (starts_with(text, "#Inventor"))
@@ -52,9 +54,10 @@ Kind kind_of(std::string_view text, const fs::path& file, const std::string& nam
   if (ending == ".ply") return Kind::kPly;
   if (ending == ".off") return Kind::kOff;
   if (ending == ".stl" || starts_with(text, "solid")) return Kind::kStl;
-  throw InputError(name,
-                   "neither its first bytes nor its ending say what kind of model this is; VRML (.wrl), OBJ, PLY, OFF "
-                   "and STL are read");
+  throw InputError(
+      name,
+      "neither its first bytes nor its ending say what kind of model this is; VRML (.wrl), OBJ, PLY, OFF "
+      "and STL are read");
 }
 
 Model load_vrml(std::string text, const std::string& name, ModelFolder& folder, const ImageReader& read_image,
@@ -73,8 +76,8 @@ Model load_vrml(std::string text, const std::string& name, ModelFolder& folder, 
   return model;
 }
 
-/// A file of a mesh format without any color does not mean a white object: its color is unknown, and it is painted in
-/// the gray that viewers show it in. (VRML is explicit: a shape without a material is white.)
+/// A file of a mesh format without any color does not mean a white object: its color is unknown, and it is
+/// painted in the gray that viewers show it in. (VRML is explicit: a shape without a material is white.)
 void paint_in_default_gray(Model& model, const std::string& name) {
   constexpr double kGray = .8;  // sRGB-encoded, as the default material of VRML has it
   const auto is_silent = [](const Material& material) { return material.source == ColorSource::kNone; };

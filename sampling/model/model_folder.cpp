@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxUrlBytes = 1024;
 constexpr std::size_t kSpellingLimit = 16;  ///< of one url
 constexpr std::size_t kChunkBytes = 1 << 18;
-constexpr std::size_t kMaxFiles = 4;  ///< all files of a model are at most this many times as large as one may be
+constexpr std::size_t kMaxFiles =
+    4;  ///< all files of a model are at most this many times as large as one may be
 
 int hex_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -70,13 +71,16 @@ ModelFolder::ModelFolder(const fs::path& model_file, std::size_t file_bytes) : f
 }
 
 bool ModelFolder::contains(const fs::path& canonical) const {
-  return std::mismatch(folder_.begin(), folder_.end(), canonical.begin(), canonical.end()).first == folder_.end();
+  return std::mismatch(folder_.begin(), folder_.end(), canonical.begin(), canonical.end()).first ==
+         folder_.end();
 }
 
 Result<fs::path> ModelFolder::find(const fs::path& base, const std::string& url) const {
-  if (url.empty() || url.size() > kMaxUrlBytes || has_control_bytes(url) || has_control_bytes(percent_decoded(url)))
+  if (url.empty() || url.size() > kMaxUrlBytes || has_control_bytes(url) ||
+      has_control_bytes(percent_decoded(url)))
     return Failure{"that is not a file name"};
-  if (url.find("://") != url.npos && url.rfind("file:", 0) != 0) return Failure{"only files beside the model are read"};
+  if (url.find("://") != url.npos && url.rfind("file:", 0) != 0)
+    return Failure{"only files beside the model are read"};
   std::string reason = "there is no such file";
   for (const std::string& spelling : spellings(url)) {
     std::error_code error;
@@ -95,18 +99,20 @@ Result<fs::path> ModelFolder::find(const fs::path& base, const std::string& url)
 std::string ModelFolder::read(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))
-    throw InputError(name(file),
-                     error || !fs::exists(file, error) ? "there is no such file" : "it is not a regular file");
+    throw InputError(
+        name(file), error || !fs::exists(file, error) ? "there is no such file" : "it is not a regular file");
   const auto size = fs::file_size(file, error);
   if (error) throw InputError(name(file), "its size cannot be read");
   if (size > file_bytes_)
-    throw InputError(name(file), "the file is larger than the limit of " + std::to_string(file_bytes_) + " bytes");
+    throw InputError(name(file),
+                     "the file is larger than the limit of " + std::to_string(file_bytes_) + " bytes");
   std::ifstream in(file, std::ios::binary);
   std::string bytes(size, '\0');
   if (!in || (size > 0 && !in.read(bytes.data(), static_cast<std::streamsize>(size))))
     throw InputError(name(file), "the file cannot be read");
   note(file);
-  if (bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b') bytes = gunzip(bytes, file_bytes_, name(file));
+  if (bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b')
+    bytes = gunzip(bytes, file_bytes_, name(file));
   read_bytes_ += bytes.size();
   if (read_bytes_ > kMaxFiles * file_bytes_)
     throw InputError(name(file), "the model's files together are larger than the limit of " +

@@ -7,8 +7,8 @@
 
 #include "sampling/base/result.h"
 
-/// The one way by which a model's readers reach files: only below the folder of the model, whatever a file names or a
-/// link points to.
+/// The one way by which a model's readers reach files: only below the folder of the model, whatever a file
+/// names or a link points to.
 namespace hilbrush {
 
 class ModelFolder {
@@ -17,13 +17,13 @@ class ModelFolder {
   /// @throws InputError if there is no such folder.
   ModelFolder(const std::filesystem::path& model_file, std::size_t file_bytes);
 
-  /// Finds the file that `url`, written in a file of folder `base`, means: as written, with \ for / and %20 for a
-  /// space, and (as exporters like to write paths of their own machine) by ever shorter ends of it. A failure if it is
-  /// not there, not a regular file, or not below the model's folder.
+  /// Finds the file that `url`, written in a file of folder `base`, means: as written, with \ for / and %20
+  /// for a space, and (as exporters like to write paths of their own machine) by ever shorter ends of it. A
+  /// failure if it is not there, not a regular file, or not below the model's folder.
   Result<std::filesystem::path> find(const std::filesystem::path& base, const std::string& url) const;
 
-  /// The bytes of a file, gunzipped if they are gzip. @throws InputError naming the file if it cannot be read, is too
-  /// large, or all files together are.
+  /// The bytes of a file, gunzipped if they are gzip. @throws InputError naming the file if it cannot be
+  /// read, is too large, or all files together are.
   std::string read(const std::filesystem::path& file);
 
   /// Notes that `file` was read otherwise than by read() (an image).
@@ -45,7 +45,8 @@ class ModelFolder {
   std::set<std::string> noted_;
 };
 
-/// Gunzips `bytes`, all members of them. @throws InputError at `file` if they are corrupt or grow beyond `limit`.
+/// Gunzips `bytes`, all members of them. @throws InputError at `file` if they are corrupt or grow beyond
+/// `limit`.
 std::string gunzip(const std::string& bytes, std::size_t limit, const std::string& file);
 
 }  // namespace hilbrush

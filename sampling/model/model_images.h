@@ -11,14 +11,16 @@
 
 namespace hilbrush {
 
-/// The image files of one model. Each file is read once, whatever it is called and whether it can be read or not, and
-/// searches for files are counted: a small model may name any number of them.
+/// The image files of one model. Each file is read once, whatever it is called and whether it can be read or
+/// not, and searches for files are counted: a small model may name any number of them.
 class ModelImages {
  public:
-  ModelImages(ModelFolder& folder, const ImageReader& read_image, const ModelLimits& limits, MeshBuilder& builder)
+  ModelImages(ModelFolder& folder, const ImageReader& read_image, const ModelLimits& limits,
+              MeshBuilder& builder)
       : folder_(folder), read_image_(read_image), builder_(builder), pixels_left_(limits.image_pixels) {}
 
-  /// Index in the builder of the texture that `url`, written in a file of folder `base`, means; or why there is none.
+  /// Index in the builder of the texture that `url`, written in a file of folder `base`, means; or why there
+  /// is none.
   Result<int> open(const std::filesystem::path& base, const std::string& url);
 
   /// The same for a file that is not an image (an inlined model): only the search is counted.

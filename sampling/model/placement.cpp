@@ -25,15 +25,16 @@ double scale_of(const Model& model, const PlacementOptions& options, double long
     if (options.unit_m && std::abs(*options.unit_m / scale - 1) > 1e-6)
       throw InputError("", "--size-mm and --units-mm contradict each other: in units of " +
                                millimeters(*options.unit_m) + " the longest side is " +
-                               millimeters(*options.unit_m * longest_side) + ", not " + millimeters(*options.size_m) +
-                               "; give one of them");
+                               millimeters(*options.unit_m * longest_side) + ", not " +
+                               millimeters(*options.size_m) + "; give one of them");
     return scale;
   }
   const std::optional<double> unit_m = options.unit_m ? options.unit_m : model.unit_m;
   if (!unit_m)
-    throw InputError("",
-                     "the model's file does not say how large the object is: give --size-mm (its longest side) or "
-                     "--units-mm (one unit of the file)");
+    throw InputError(
+        "",
+        "the model's file does not say how large the object is: give --size-mm (its longest side) or "
+        "--units-mm (one unit of the file)");
   if (!std::isfinite(*unit_m) || *unit_m <= 0) throw InputError("", "the unit must be more than 0 mm");
   return *unit_m;
 }
@@ -52,7 +53,8 @@ TexturedMesh place_on_table(const Model& model, const PlacementOptions& options)
   const double scale = scale_of(model, options, longest_side);
   const double size_m = scale * longest_side;
   if (!std::isfinite(size_m) || size_m > kMaxSideM)
-    throw InputError("", "the object would be " + millimeters(size_m) + " long, more than " + millimeters(kMaxSideM) +
+    throw InputError("", "the object would be " + millimeters(size_m) + " long, more than " +
+                             millimeters(kMaxSideM) +
                              "; give --size-mm (its longest side) or --units-mm (one unit of the file)");
   if (size_m < kMinSideM) throw InputError("", "the object would be only " + millimeters(size_m) + " long");
   const Eigen::Vector3d foot((low.x() + high.x()) / 2, (low.y() + high.y()) / 2, low.z());

@@ -27,7 +27,8 @@ struct SortKey {
   }
 };
 
-/// By triangle, which of the connected parts it belongs to; parts are numbered in the order of their first triangles.
+/// By triangle, which of the connected parts it belongs to; parts are numbered in the order of their first
+/// triangles.
 std::vector<std::uint32_t> parts_of(const TexturedMesh& mesh) {
   UnionFind sets(mesh.vertices.size());
   for (const auto& corners : mesh.triangles) {

@@ -17,7 +17,8 @@ Eigen::Vector3d position(const TexturedMesh& mesh, const SurfacePoint& point) {
   return p;
 }
 
-SurfacePoint foot_of_perpendicular(const TexturedMesh& mesh, std::uint32_t triangle, const Eigen::Vector3d& p_O) {
+SurfacePoint foot_of_perpendicular(const TexturedMesh& mesh, std::uint32_t triangle,
+                                   const Eigen::Vector3d& p_O) {
   const Eigen::Vector3d area = mesh.area_vector(triangle);
   const auto share = [&](int c) {
     const Eigen::Vector3d& from = mesh.corner(triangle, (c + 1) % 3);
@@ -34,7 +35,8 @@ Eigen::Vector3d face_normal(const TexturedMesh& mesh, const SurfacePoint& point)
 
 std::array<Eigen::Vector3d, 2> bounds(const TexturedMesh& mesh) {
   const double infinity = std::numeric_limits<double>::infinity();
-  std::array<Eigen::Vector3d, 2> box{Eigen::Vector3d::Constant(infinity), Eigen::Vector3d::Constant(-infinity)};
+  std::array<Eigen::Vector3d, 2> box{Eigen::Vector3d::Constant(infinity),
+                                     Eigen::Vector3d::Constant(-infinity)};
   for (const auto& triangle : mesh.triangles)
     for (const auto v : triangle) {
       box[0] = box[0].cwiseMin(mesh.vertices[v]);

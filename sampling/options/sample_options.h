@@ -4,7 +4,8 @@
 
 #include "sampling/base/enum_names.h"
 
-/// Settings of sampling, and the names of their choices. No mesh and no picture, so that config/ can read them.
+/// Settings of sampling, and the names of their choices. No mesh and no picture, so that config/ can read
+/// them.
 namespace hilbrush {
 
 /// How a dot is placed in its stratum (a stretch of the curve that holds the mass of one dot).
@@ -72,12 +73,13 @@ struct SampleOptions {
   std::optional<std::uint64_t> dot_count = {};  ///< or exactly this many; the pitch follows
   Sampler sampler = Sampler::kCentroid;
   std::uint64_t seed = 1;
-  double omega = 4;                       ///< a quad is split while it may misplace more than 1/omega of a dot
+  double omega = 4;  ///< a quad is split while it may misplace more than 1/omega of a dot
   std::optional<int> uniform_depth = {};  ///< or: until it has this depth, whatever it holds; for comparison
   std::uint64_t dot_limit = 50'000'000;   ///< more is an InputError that names dpi and size
 };
 
-/// @throws InputError if neither or both of pitch and count are given, or the one given is not a positive number.
+/// @throws InputError if neither or both of pitch and count are given, or the one given is not a positive
+/// number.
 void check_pitch_or_count(const SampleOptions& options);
 /// @throws InputError if `count` dots are more than dot_limit.
 void check_dot_limit(const SampleOptions& options, double count);

@@ -4,18 +4,20 @@
 
 #include "sampling/base/enum_names.h"
 
-/// Options of the tone: what the paint can show and what must be asked of it. No mesh and no picture, so that config/
-/// can read them.
+/// Options of the tone: what the paint can show and what must be asked of it. No mesh and no picture, so that
+/// config/ can read them.
 namespace hilbrush {
 
-/// Asked coverage for wanted coverage, both 0 = white, 1 = one full dot a pitch squared; undoes dot gain. Piecewise
-/// linear. `asked` may exceed 1: where the paint needs more than one dot's energy a pitch squared to be black.
+/// Asked coverage for wanted coverage, both 0 = white, 1 = one full dot a pitch squared; undoes dot gain.
+/// Piecewise linear. `asked` may exceed 1: where the paint needs more than one dot's energy a pitch squared
+/// to be black.
 struct ToneCurve {
   std::vector<double> wanted;  ///< strictly rising from 0 to 1
   std::vector<double> asked;   ///< rising, same length; both empty: identity
 
   double operator()(double coverage) const;
-  /// The wanted coverage for which the curve asks this much; where `asked` stays level, the start of that part.
+  /// The wanted coverage for which the curve asks this much; where `asked` stays level, the start of that
+  /// part.
   double inverse(double asked_coverage) const;
 };
 
@@ -41,7 +43,8 @@ struct ToneOptions {
   double reflectance_black = 0;  ///< ... and of fully exposed paint (Murray-Davies)
   Untextured untextured = Untextured::kAuto;
   ToneCurve curve;
-  /// Of the dots: the curve holds for the mean coverage over about a pitch (tone/pitch_mean.h). 0: for every texel.
+  /// Of the dots: the curve holds for the mean coverage over about a pitch (tone/pitch_mean.h). 0: for every
+  /// texel.
   double pitch_m = 0;
 };
 

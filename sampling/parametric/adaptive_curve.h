@@ -5,7 +5,8 @@
 
 #include "sampling/parametric/density.h"
 
-/// The adaptive curve over the unit square of a parametric surface (the thesis, figure 4.6), walked without keeping it.
+/// The adaptive curve over the unit square of a parametric surface (the thesis, figure 4.6), walked without
+/// keeping it.
 namespace hilbrush {
 
 /// When a quad is divided.
@@ -24,7 +25,8 @@ struct Node {
   int depth = 0;
   Quad quad;
   bool has_grid = false;
-  std::array<Eigen::Vector3d, 9> grid;  ///< positions of corners, mid-sides and center, row by row, if has_grid
+  std::array<Eigen::Vector3d, 9>
+      grid;  ///< positions of corners, mid-sides and center, row by row, if has_grid
 
   double size() const { return 1 / static_cast<double>(side_count); }
   /// The place at the shares `right` and `up` (0 to 1) of the square, from its lower left corner.

@@ -16,7 +16,9 @@ inline double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, 
 /// (b) Of the leaf's four corners, as two triangles.
 template <class Quad>
 double square_area(const ParametricSurface& surface, const Node<Quad>& leaf) {
-  const auto corner = [&](unsigned k) { return leaf.has_grid ? leaf.grid[k] : surface.position(leaf.grid_uv(k)); };
+  const auto corner = [&](unsigned k) {
+    return leaf.has_grid ? leaf.grid[k] : surface.position(leaf.grid_uv(k));
+  };
   const Eigen::Vector3d a = corner(0);
   const Eigen::Vector3d b = corner(2);
   const Eigen::Vector3d c = corner(8);
@@ -37,15 +39,16 @@ struct VertexArea {
   Eigen::Vector2d density_uv;
 };
 
-/// Walks the leaves of a node and calls visit(leaf, VertexArea) for each. Method (a) uses the vertices before and
-/// after, also beyond the ends of the node; the first and the last vertex of the curve have no triangle and no area.
+/// Walks the leaves of a node and calls visit(leaf, VertexArea) for each. Method (a) uses the vertices before
+/// and after, also beyond the ends of the node; the first and the last vertex of the curve have no triangle
+/// and no area.
 template <class Quad>
 class AreaWalk {
  public:
   using NodeType = Node<Quad>;
 
-  AreaWalk(const ParametricSurface& surface, const AdaptiveCurve<Quad>& curve, const std::vector<NodeType>& nodes,
-           AreaMethod method)
+  AreaWalk(const ParametricSurface& surface, const AdaptiveCurve<Quad>& curve,
+           const std::vector<NodeType>& nodes, AreaMethod method)
       : surface_(surface), curve_(curve), nodes_(nodes), method_(method) {}
 
   template <class Visit>
@@ -71,7 +74,9 @@ class AreaWalk {
     Eigen::Vector3d position;
   };
 
-  Vertex vertex(const NodeType& leaf) const { return {leaf.center_uv(), surface_.position(leaf.center_uv())}; }
+  Vertex vertex(const NodeType& leaf) const {
+    return {leaf.center_uv(), surface_.position(leaf.center_uv())};
+  }
 
   static VertexArea area_of(const Vertex& a, const Vertex& b, const Vertex& c) {
     return {triangle_area(a.position, b.position, c.position), (a.uv + b.uv + c.uv) / 3};
@@ -96,7 +101,8 @@ class AreaWalk {
       pass(vertex(leaf));
       waiting = leaf;
     });
-    pass(index + 1 < nodes_.size() ? std::optional(vertex(curve_.end_leaf(nodes_[index + 1], false))) : std::nullopt);
+    pass(index + 1 < nodes_.size() ? std::optional(vertex(curve_.end_leaf(nodes_[index + 1], false)))
+                                   : std::nullopt);
   }
 
   const ParametricSurface& surface_;

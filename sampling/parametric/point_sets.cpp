@@ -24,9 +24,9 @@ double radical_inverse_3(std::uint64_t k) {
   return number;
 }
 
-/// Direction numbers of both sequences, 32 binary digits. First dimension, polynomial x: the identity. Second,
-/// polynomial x + 1: digit j of number r is the coefficient of x^-(r+1) in 1 / (x + 1)^(j+1), which is binomial(r, j)
-/// modulo 2; so each number is the one before plus half of it.
+/// Direction numbers of both sequences, 32 binary digits. First dimension, polynomial x: the identity.
+/// Second, polynomial x + 1: digit j of number r is the coefficient of x^-(r+1) in 1 / (x + 1)^(j+1), which
+/// is binomial(r, j) modulo 2; so each number is the one before plus half of it.
 struct DirectionNumbers {
   std::array<std::array<std::uint32_t, 32>, 2> of_dimension;
 
@@ -40,8 +40,8 @@ struct DirectionNumbers {
 };
 constexpr DirectionNumbers kDirections;
 
-/// Points first .. first + count - 1 of the digital sequence, in order of Gray codes: each differs from the one before
-/// by one direction number (Antonov and Saleev 1979).
+/// Points first .. first + count - 1 of the digital sequence, in order of Gray codes: each differs from the
+/// one before by one direction number (Antonov and Saleev 1979).
 std::vector<Vector2d> digital_points(std::uint32_t first, std::uint64_t count) {
   std::array<std::uint32_t, 2> digits{};
   for (std::uint32_t gray = first ^ first >> 1; gray != 0; gray &= gray - 1)
@@ -92,7 +92,8 @@ std::vector<Vector2d> plane_set(PlaneSet set, std::uint64_t count, std::uint64_t
     case PlaneSet::kJittered:
       return jittered_grid(count, seed);
     case PlaneSet::kHalton:
-      return one_by_one(count, [](std::uint64_t k) { return Vector2d(radical_inverse_2(k), radical_inverse_3(k)); });
+      return one_by_one(count,
+                        [](std::uint64_t k) { return Vector2d(radical_inverse_2(k), radical_inverse_3(k)); });
     case PlaneSet::kHammersley:
       return one_by_one(count, [&](std::uint64_t k) {
         return Vector2d(radical_inverse_2(k), (static_cast<double>(k) + .5) / static_cast<double>(count));

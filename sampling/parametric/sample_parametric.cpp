@@ -17,8 +17,8 @@ using Eigen::Vector2d;
 
 constexpr std::uint64_t kMaxDots = 100'000'000;
 
-/// Depths of a curve: that of the nodes on which threads work, the defaults of minimum and maximum, and the largest one
-/// that a setting may ask for, at which the number of leaves is still exact in a double.
+/// Depths of a curve: that of the nodes on which threads work, the defaults of minimum and maximum, and the
+/// largest one that a setting may ask for, at which the number of leaves is still exact in a double.
 template <class Quad>
 struct Depths;
 template <>
@@ -87,7 +87,8 @@ class Sampling {
 
   ParametricAreas areas() {
     ParametricAreas areas;
-    for (const AreaMethod method : {AreaMethod::kTriangle, AreaMethod::kSquare, AreaMethod::kFirstFundamentalForm}) {
+    for (const AreaMethod method :
+         {AreaMethod::kTriangle, AreaMethod::kSquare, AreaMethod::kFirstFundamentalForm}) {
       options_.area = method;
       ParametricSamples measured;
       measure(measured);
@@ -99,7 +100,8 @@ class Sampling {
 
   std::vector<Vector2d> vertices() {
     std::vector<Vector2d> all;
-    for (NodeOf node : nodes_) curve_.walk(node, [&](const NodeOf& leaf) { all.push_back(leaf.center_uv()); });
+    for (NodeOf node : nodes_)
+      curve_.walk(node, [&](const NodeOf& leaf) { all.push_back(leaf.center_uv()); });
     return all;
   }
 
@@ -190,7 +192,8 @@ class Sampling {
           if (++next < end) threshold = sequence.at(next) * total();
         }
       });
-      for (; next < end; ++next) dots[next].uv = place_in(last, 1);  // those that rounding put beyond the last leaf
+      for (; next < end; ++next)
+        dots[next].uv = place_in(last, 1);  // those that rounding put beyond the last leaf
     });
   }
 
@@ -204,7 +207,8 @@ class Sampling {
   /// Strata of equal mass; a dot at each one's center of mass in the parameter domain.
   void place_centroids(std::vector<ParametricDot>& dots) const {
     std::vector<std::vector<StratumShare>> shares(nodes_.size());
-    tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) { shares[n] = cut_strata(n, dots.size()); });
+    tbb::parallel_for(std::size_t{0}, nodes_.size(),
+                      [&](std::size_t n) { shares[n] = cut_strata(n, dots.size()); });
     std::vector<double> masses(dots.size(), 0);
     for (auto& dot : dots) dot.uv.setZero();
     for (const auto& of_node : shares)
@@ -290,7 +294,8 @@ ParametricAreas measure_parametric(const ParametricSurface& surface, const Param
   return with_curve(surface, options, [](auto& sampling) { return sampling.areas(); });
 }
 
-std::vector<Eigen::Vector2d> parametric_curve(const ParametricSurface& surface, const ParametricOptions& options) {
+std::vector<Eigen::Vector2d> parametric_curve(const ParametricSurface& surface,
+                                              const ParametricOptions& options) {
   return with_curve(surface, options, [](auto& sampling) { return sampling.vertices(); });
 }
 

@@ -112,8 +112,8 @@ RoundRoots plain_roots(double quarters, double slope) {
   return {cube_root(cos(angle)), cube_root(sin(angle))};
 }
 
-/// In the eighths on either side of a quarter turn the angle from it grows as 2 pi r^3, so that the cube root of its
-/// sine, (2 pi)^(1/3) r sinc^(1/3), is smooth.
+/// In the eighths on either side of a quarter turn the angle from it grows as 2 pi r^3, so that the cube root
+/// of its sine, (2 pi)^(1/3) r sinc^(1/3), is smooth.
 RoundRoots smooth_roots(double quarters, double slope) {
   const double nearest = std::round(quarters);
   const Jet r{quarters - nearest, slope, 0};

@@ -29,11 +29,13 @@ Forms forms_at(const ParametricSurface& surface, const Vector2d& uv) {
 Vector3d ParametricSurface::normal(const Vector2d& uv) const {
   const Vector2d middle(.5, .5);
   for (double towards_middle = 0; towards_middle < .1; towards_middle = 10 * towards_middle + 1e-7) {
-    const Vector2d beside = uv + towards_middle * (middle - uv) + Vector2d(towards_middle, 2 * towards_middle) / 16;
+    const Vector2d beside =
+        uv + towards_middle * (middle - uv) + Vector2d(towards_middle, 2 * towards_middle) / 16;
     const Tangents t = tangents(beside);
     const Vector3d normal = t.du.cross(t.dv);
     const double length = normal.norm();
-    if (std::isfinite(length) && length > 1e-12 * t.du.norm() * t.dv.norm() && length > 1e-30) return normal / length;
+    if (std::isfinite(length) && length > 1e-12 * t.du.norm() * t.dv.norm() && length > 1e-30)
+      return normal / length;
   }
   return Vector3d::UnitZ();
 }

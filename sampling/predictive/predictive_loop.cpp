@@ -24,7 +24,8 @@ constexpr double kTexelPitches = .5;
 constexpr double kErrorPitches = 1;
 /// Largest correction of a wanted tone, in either direction; tones are from 0 to 1.
 constexpr double kMaxCorrection = 1;
-/// Largest factor by which a triangle's texels are scaled to keep its mass; a larger one would only amplify rounding.
+/// Largest factor by which a triangle's texels are scaled to keep its mass; a larger one would only amplify
+/// rounding.
 constexpr double kMaxRescaling = 2;
 
 /// Visits the nodes of a triangle's rectangle whose box, `reach` steps to each side, meets the triangle.
@@ -49,11 +50,12 @@ class Correction {
       : layout_(asked.mesh(), kErrorPitches * pitch_m, texel_limit), values_(layout_.texel_count(), 0.f) {
     for (std::uint32_t t = 0; t < asked.mesh().triangle_count(); ++t) {
       if (asked.is_blank(t)) continue;
-      visit_nodes(layout_, t, 1,
-                  [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon&) {
-                    points_.push_back(frame.point_inside(node));
-                    texels_.push_back(texel);
-                  });
+      visit_nodes(
+          layout_, t, 1,
+          [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon&) {
+            points_.push_back(frame.point_inside(node));
+            texels_.push_back(texel);
+          });
     }
   }
 
@@ -109,12 +111,13 @@ class AskedTexels {
   std::vector<float> corrected(const Correction& correction) const {
     std::vector<float> tones = texels_;
     visit_triangles([&](std::uint32_t t) {
-      visit_nodes(layout_, t, 1,
-                  [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon&) {
-                    if (!(tones[texel] > 0)) return;
-                    const double wanted = curve_.inverse(tones[texel]) + correction.at(frame, t, node);
-                    tones[texel] = static_cast<float>(curve_(std::clamp(wanted, 0., 1.)));
-                  });
+      visit_nodes(
+          layout_, t, 1,
+          [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon&) {
+            if (!(tones[texel] > 0)) return;
+            const double wanted = curve_.inverse(tones[texel]) + correction.at(frame, t, node);
+            tones[texel] = static_cast<float>(curve_(std::clamp(wanted, 0., 1.)));
+          });
     });
     return tones;
   }
@@ -128,18 +131,19 @@ class AskedTexels {
                       });
   }
 
-  /// Each texel is the mean over its box, so that a line thinner than a texel is not lost; a node whose own box lies
-  /// outside of the triangle takes the mean over a box twice as wide.
+  /// Each texel is the mean over its box, so that a line thinner than a texel is not lost; a node whose own
+  /// box lies outside of the triangle takes the mean over a box twice as wide.
   void bake() {
     texels_.assign(layout_.texel_count(), 0.f);
     visit_triangles([&](std::uint32_t t) {
-      visit_nodes(layout_, t, 1,
-                  [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon& wide) {
-                    const Vector2d half = .5 * layout_.step_m(frame, t);
-                    const BoxedPolygon box = frame.clip_box(node - half, node + half);
-                    const ToneIntegral integral = asked_.integrate(t, (box.count > 0 ? box : wide).corners());
-                    if (integral.area_m2 > 0) texels_[texel] = static_cast<float>(integral.mass / integral.area_m2);
-                  });
+      visit_nodes(
+          layout_, t, 1,
+          [&](const TriangleFrame& frame, std::size_t texel, const Vector2d& node, const BoxedPolygon& wide) {
+            const Vector2d half = .5 * layout_.step_m(frame, t);
+            const BoxedPolygon box = frame.clip_box(node - half, node + half);
+            const ToneIntegral integral = asked_.integrate(t, (box.count > 0 ? box : wide).corners());
+            if (integral.area_m2 > 0) texels_[texel] = static_cast<float>(integral.mass / integral.area_m2);
+          });
     });
   }
 
@@ -152,9 +156,10 @@ class AskedTexels {
       const double own = baked.integrate(t, whole).mass;
       if (!(own > 0)) return;
       const double scale = std::clamp(mass / own, 1 / kMaxRescaling, kMaxRescaling);
-      visit_nodes(layout_, t, 1, [&](const TriangleFrame&, std::size_t texel, const Vector2d&, const BoxedPolygon&) {
-        texels_[texel] = static_cast<float>(texels_[texel] * scale);
-      });
+      visit_nodes(layout_, t, 1,
+                  [&](const TriangleFrame&, std::size_t texel, const Vector2d&, const BoxedPolygon&) {
+                    texels_[texel] = static_cast<float>(texels_[texel] * scale);
+                  });
     });
   }
 
@@ -164,10 +169,10 @@ class AskedTexels {
   std::vector<float> texels_;
 };
 
-/// A point in a box of the triangle that asks for dots, by halving the box towards the larger mass; none if the box is
-/// blank.
-std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const TriangleFrame& frame, std::uint32_t triangle,
-                                           Vector2d low, Vector2d high) {
+/// A point in a box of the triangle that asks for dots, by halving the box towards the larger mass; none if
+/// the box is blank.
+std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const TriangleFrame& frame,
+                                           std::uint32_t triangle, Vector2d low, Vector2d high) {
   constexpr int kMaxHalvings = 40;  // each side is halved 20 times: a millionth of the box
   ToneIntegral integral = asked.integrate(triangle, frame.clip_box(low, high).corners());
   for (int halving = 0; halving < kMaxHalvings && integral.mass > 0; ++halving) {
@@ -187,8 +192,8 @@ std::optional<SurfacePoint> heaviest_point(const ToneField& asked, const Triangl
   return std::nullopt;
 }
 
-/// Between texels the atlas is interpolated, so a dot may lie up to a texel outside of what is asked for: it is moved
-/// back.
+/// Between texels the atlas is interpolated, so a dot may lie up to a texel outside of what is asked for: it
+/// is moved back.
 void return_strays(DotSequence& dots, const ToneField& asked) {
   const TexturedMesh& mesh = asked.mesh();
   tbb::parallel_for(std::size_t{0}, dots.dots.size(), [&](std::size_t i) {
@@ -216,7 +221,8 @@ ToneField field_of(const ToneField& base, const AtlasLayout& layout, std::vector
 
 DotSequence place_predictively(const ToneField& asked, const ToneField& density, const ToneCurve& curve,
                                const PredictiveOptions& options, const PlaceByDensity& place,
-                               const PicturePredictor& predict, PredictiveReport* report, const Progress& progress) {
+                               const PicturePredictor& predict, PredictiveReport* report,
+                               const Progress& progress) {
   DotSequence dots = place(density);
   assign_levels(dots, asked, density, options.levels);
   if (dots.dots.empty() || options.rounds == 0) return dots;

@@ -8,13 +8,14 @@
 #include "sampling/options/tone_options.h"
 #include "sampling/tone/tone_field.h"
 
-/// Places dots, predicts the picture they will make, and corrects what is asked for where it is too light or too dark.
+/// Places dots, predicts the picture they will make, and corrects what is asked for where it is too light or
+/// too dark.
 ///
-/// A tone curve is measured on flat gray; a picture also has edges, thin lines, grain and curved surface. The loop
-/// measures what they do to the tone and subtracts a share of the error from the wanted tone. What is asked for then is
-/// not a function of the texture any more (texture coordinates overlap: one texel may be many places), so it is kept in
-/// an atlas of the triangles (tone/asked_atlas.h), on which the curve integrates as exactly as on a texture. Blank
-/// surface stays blank.
+/// A tone curve is measured on flat gray; a picture also has edges, thin lines, grain and curved surface. The
+/// loop measures what they do to the tone and subtracts a share of the error from the wanted tone. What is
+/// asked for then is not a function of the texture any more (texture coordinates overlap: one texel may be
+/// many places), so it is kept in an atlas of the triangles (tone/asked_atlas.h), on which the curve
+/// integrates as exactly as on a texture. Blank surface stays blank.
 namespace hilbrush {
 
 /// Predicts what the paint will show; implemented with the simulated film (sim/film/prediction.h).
@@ -40,10 +41,10 @@ struct PredictiveReport {
   std::size_t texel_count = 0;
 };
 
-/// `asked` and `density` are the fields of the energy asked for and of the dots (the same field with one level);
-/// `curve` is the tone curve in `asked`. Deterministic. Memory: ten bytes a texel (24 with levels), four texels a pitch
-/// squared and as many again for the atlas's corners, in addition to the film's. Cost: each round places, paints and
-/// measures all dots once.
+/// `asked` and `density` are the fields of the energy asked for and of the dots (the same field with one
+/// level); `curve` is the tone curve in `asked`. Deterministic. Memory: ten bytes a texel (24 with levels),
+/// four texels a pitch squared and as many again for the atlas's corners, in addition to the film's. Cost:
+/// each round places, paints and measures all dots once.
 DotSequence place_predictively(const ToneField& asked, const ToneField& density, const ToneCurve& curve,
                                const PredictiveOptions& options, const PlaceByDensity& place,
                                const PicturePredictor& predict, PredictiveReport* report = nullptr,

@@ -115,8 +115,8 @@ Coherence spatial_coherence(PlaneCurve curve, int depth, const TestShapes& pairs
   };
   for (std::size_t i = 0; i < pairs.count; ++i) {
     const ShapeNumbers number(pairs, 4, i);
-    result.pairs.push_back(
-        pair_of(static_cast<std::uint64_t>(number(0) * whole), static_cast<std::uint64_t>(number(1) * whole)));
+    result.pairs.push_back(pair_of(static_cast<std::uint64_t>(number(0) * whole),
+                                   static_cast<std::uint64_t>(number(1) * whole)));
     take(result.pairs.back());
   }
   result.correlation = correlation_of(result.pairs);

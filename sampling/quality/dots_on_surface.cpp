@@ -20,7 +20,8 @@ DotsOnSurface::DotsOnSurface(const TexturedMesh& mesh, const Neighbors& neighbor
   std::transform(dots.begin(), dots.end(), triangles_.begin(), [](const Dot& dot) { return dot.triangle; });
 }
 
-double DotsOnSurface::distance(const Eigen::Vector3d& place_O, std::uint32_t triangle, std::uint32_t but) const {
+double DotsOnSurface::distance(const Eigen::Vector3d& place_O, std::uint32_t triangle,
+                               std::uint32_t but) const {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   GrowingBall& ball = balls_.local();
   ball.begin(place_O, triangle);

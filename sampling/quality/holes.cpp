@@ -25,7 +25,8 @@ std::vector<SearchTriangle> sphere_triangles(int times) {
     for (const SearchTriangle& t : triangles) {
       std::array<Vector3d, 3> middles;
       for (std::size_t k = 0; k < 3; ++k) middles[k] = (t.corners[k] + t.corners[(k + 1) % 3]).normalized();
-      for (std::size_t k = 0; k < 3; ++k) finer.push_back({{t.corners[k], middles[k], middles[(k + 2) % 3]}, 0});
+      for (std::size_t k = 0; k < 3; ++k)
+        finer.push_back({{t.corners[k], middles[k], middles[(k + 2) % 3]}, 0});
       finer.push_back({middles, 0});
     }
     triangles = std::move(finer);
@@ -39,9 +40,10 @@ double plane_largest_hole(std::span<const Vector2d> points) {
   CHECK(!points.empty());
   const PointTree<2> tree(points);
   const Vector3d o(0, 0, 0), x(1, 0, 0), y(0, 1, 0), xy(1, 1, 0);
-  const double radius = largest_distance(
-      {{{o, x, xy}, 0}, {{o, xy, y}, 0}},
-      [&tree](const Vector3d& place, std::uint32_t) { return tree.nearest(place.head<2>(), kAnyPoint).distance; });
+  const double radius =
+      largest_distance({{{o, x, xy}, 0}, {{o, xy, y}, 0}}, [&tree](const Vector3d& place, std::uint32_t) {
+        return tree.nearest(place.head<2>(), kAnyPoint).distance;
+      });
   return radius * std::sqrt(static_cast<double>(points.size()));
 }
 
@@ -54,7 +56,8 @@ double sphere_largest_hole(std::span<const Vector3d> directions) {
   for (const SearchTriangle& t : triangles) innermost = std::min(innermost, t.middle().norm());
   const double stretch = 1 / (innermost * innermost);
   const double chord =
-      stretch * largest_distance(std::move(triangles), [&tree, stretch](const Vector3d& place, std::uint32_t) {
+      stretch *
+      largest_distance(std::move(triangles), [&tree, stretch](const Vector3d& place, std::uint32_t) {
         return tree.nearest(place.normalized(), kAnyPoint).distance / stretch;
       });
   return chord * std::sqrt(static_cast<double>(directions.size()) / (4 * std::numbers::pi));

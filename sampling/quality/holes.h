@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <vector>
 
-/// Finds the place that is farthest from all points, by branch and bound: in a triangle whose middle is d from the
-/// nearest point and r from its own farthest corner, no place is farther than d + r from all points.
+/// Finds the place that is farthest from all points, by branch and bound: in a triangle whose middle is d
+/// from the nearest point and r from its own farthest corner, no place is farther than d + r from all points.
 namespace hilbrush {
 
 /// A flat triangle in space that is searched. `face` is passed to the distance function.
@@ -46,11 +46,12 @@ struct SearchLimits {
   double smallest_m = 0;    ///< triangles whose corners are no farther from their middle are not divided
 };
 
-/// Largest value of `distance(place, face)` over all triangles; `distance` must not rise faster than the place moves.
-/// Depth first, a fixed number of triangles at a time in parallel: little memory, and the same result for any number of
-/// threads.
+/// Largest value of `distance(place, face)` over all triangles; `distance` must not rise faster than the
+/// place moves. Depth first, a fixed number of triangles at a time in parallel: little memory, and the same
+/// result for any number of threads.
 template <class Distance>
-double largest_distance(std::vector<SearchTriangle> open, const Distance& distance, const SearchLimits& limits = {}) {
+double largest_distance(std::vector<SearchTriangle> open, const Distance& distance,
+                        const SearchLimits& limits = {}) {
   constexpr std::size_t kBatch = 1 << 14;  // triangles
   double best = 0;
   std::vector<double> at_middle(kBatch), bound(kBatch);

@@ -38,7 +38,8 @@ double triangle_error(const PointTree<2>& tree, const ShapeNumbers& number) {
   }
   const Vector2d ab = b - a;
   const Vector2d inward(-ab.y(), ab.x());
-  const HalfSpaces<2, 3> triangle{{Vector2d(-a.y(), a.x()), Vector2d(b.y(), -b.x()), inward}, {0, 0, inward.dot(a)}};
+  const HalfSpaces<2, 3> triangle{{Vector2d(-a.y(), a.x()), Vector2d(b.y(), -b.x()), inward},
+                                  {0, 0, inward.dot(a)}};
   return error_of(tree, triangle, cross / 2);
 }
 
@@ -101,8 +102,9 @@ std::array<Discrepancy, 3> plane_discrepancies(std::span<const Vector2d> points,
 Discrepancy sphere_discrepancy(std::span<const Vector3d> directions, const TestShapes& shapes) {
   CHECK(!directions.empty());
   const PointTree<3> tree(directions);
-  return measure_shapes(shapes.count,
-                        [&](std::size_t i) { return spherical_triangle_error(tree, ShapeNumbers(shapes, 3, i)); });
+  return measure_shapes(shapes.count, [&](std::size_t i) {
+    return spherical_triangle_error(tree, ShapeNumbers(shapes, 3, i));
+  });
 }
 
 double log_log_slope(std::span<const double> counts, std::span<const double> values) {

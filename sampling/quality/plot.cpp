@@ -22,7 +22,8 @@ constexpr double kLeftMargin = 76;
 constexpr double kRightMargin = 20;
 constexpr double kTopMargin = 40;
 constexpr double kBottomMargin = 52;
-constexpr std::array kColors{"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b", "#6a4c93", "#555555", "#e07a3f", "#008b8b"};
+constexpr std::array kColors{"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b",
+                             "#6a4c93", "#555555", "#e07a3f", "#008b8b"};
 
 /// Digits of labels and of widths.
 constexpr int kDigits = 4;
@@ -49,14 +50,15 @@ std::string escaped(const std::string& text) {
 }
 
 std::string text_at(double x, double y, const std::string& text, const std::string& attributes = {}) {
-  return "<text x=\"" + place(x) + "\" y=\"" + place(y) + "\"" + (attributes.empty() ? "" : " " + attributes) + ">" +
-         escaped(text) + "</text>\n";
+  return "<text x=\"" + place(x) + "\" y=\"" + place(y) + "\"" +
+         (attributes.empty() ? "" : " " + attributes) + ">" + escaped(text) + "</text>\n";
 }
 
 std::string opening(double width, double height) {
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + number(width, 6) + "\" height=\"" + number(height, 6) +
-         "\" viewBox=\"0 0 " + number(width, 6) + " " + number(height, 6) +
-         "\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + number(width, 6) + "\" height=\"" +
+         number(height, 6) + "\" viewBox=\"0 0 " + number(width, 6) + " " + number(height, 6) +
+         "\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" "
+         "fill=\"white\"/>\n";
 }
 
 /// Maps values to coordinates along one side of the drawing.
@@ -115,18 +117,21 @@ Axis axis_of(const Plot& plot, int coordinate) {
 std::string frame_of(const Plot& plot, const Axis& x, const Axis& y) {
   std::string svg;
   for (const double value : x.ticks()) {
-    svg += "<path stroke=\"#ddd\" d=\"M" + place(x.at(value)) + " " + place(y.begin) + "V" + place(y.end) + "\"/>\n";
+    svg += "<path stroke=\"#ddd\" d=\"M" + place(x.at(value)) + " " + place(y.begin) + "V" + place(y.end) +
+           "\"/>\n";
     svg += text_at(x.at(value), y.begin + 16, number(value, kDigits), "text-anchor=\"middle\"");
   }
   for (const double value : y.ticks()) {
-    svg += "<path stroke=\"#ddd\" d=\"M" + place(x.begin) + " " + place(y.at(value)) + "H" + place(x.end) + "\"/>\n";
+    svg += "<path stroke=\"#ddd\" d=\"M" + place(x.begin) + " " + place(y.at(value)) + "H" + place(x.end) +
+           "\"/>\n";
     svg += text_at(x.begin - 6, y.at(value) + 4, number(value, kDigits), "text-anchor=\"end\"");
   }
-  svg += "<path stroke=\"black\" fill=\"none\" d=\"M" + place(x.begin) + " " + place(y.end) + "V" + place(y.begin) +
-         "H" + place(x.end) + "\"/>\n";
+  svg += "<path stroke=\"black\" fill=\"none\" d=\"M" + place(x.begin) + " " + place(y.end) + "V" +
+         place(y.begin) + "H" + place(x.end) + "\"/>\n";
   svg += text_at((x.begin + x.end) / 2, kHeight - 14, plot.x_label, "text-anchor=\"middle\"");
   const double middle = (y.begin + y.end) / 2;
-  svg += text_at(16, middle, plot.y_label, "text-anchor=\"middle\" transform=\"rotate(-90 16 " + place(middle) + ")\"");
+  svg += text_at(16, middle, plot.y_label,
+                 "text-anchor=\"middle\" transform=\"rotate(-90 16 " + place(middle) + ")\"");
   return svg + text_at(kWidth / 2, 22, plot.title, "text-anchor=\"middle\" font-size=\"15\"");
 }
 
@@ -146,8 +151,8 @@ std::string marks_of(const PlotSeries& series, const Axis& x, const Axis& y, con
   for (const Vector2d& point : series.points)
     if (point.allFinite() && x.shows(point.x()) && y.shows(point.y()))
       path += "M" + place(x.at(point.x())) + " " + place(y.at(point.y())) + "h0";
-  return "<path fill=\"none\" stroke=\"" + color + "\" stroke-width=\"3\" stroke-linecap=\"round\" d=\"" + path +
-         "\"/>\n";
+  return "<path fill=\"none\" stroke=\"" + color + "\" stroke-width=\"3\" stroke-linecap=\"round\" d=\"" +
+         path + "\"/>\n";
 }
 
 /// As wide as the points are apart.
@@ -155,8 +160,8 @@ std::string bars_of(const PlotSeries& series, const Axis& x, const Axis& y, cons
   std::string path;
   const double step = series.points.size() > 1 ? x.at(series.points[1].x()) - x.at(series.points[0].x()) : 20;
   for (const Vector2d& point : series.points)
-    path += "M" + place(x.at(point.x()) - .45 * step) + " " + place(y.begin) + "V" + place(y.at(point.y())) + "h" +
-            place(.9 * step) + "V" + place(y.begin) + "z";
+    path += "M" + place(x.at(point.x()) - .45 * step) + " " + place(y.begin) + "V" + place(y.at(point.y())) +
+            "h" + place(.9 * step) + "V" + place(y.begin) + "z";
   return "<path fill=\"" + color + "\" d=\"" + path + "\"/>\n";
 }
 
@@ -181,12 +186,14 @@ std::string picture_at(const PointPicture& picture, double left, double top, dou
   const Vector2d extent = bounds.high - bounds.low;
   const double scale = size / std::max({extent.x(), extent.y(), 1e-300});
   const auto to_page = [&](const Vector2d& p) {
-    return place(left + scale * (p.x() - bounds.low.x())) + " " + place(top + scale * (bounds.high.y() - p.y()));
+    return place(left + scale * (p.x() - bounds.low.x())) + " " +
+           place(top + scale * (bounds.high.y() - p.y()));
   };
   std::string svg = text_at(left + size / 2, top - 8, picture.title, "text-anchor=\"middle\"");
   if (!picture.path.empty()) {
     svg += "<path fill=\"none\" stroke=\"#1b6ca8\" stroke-width=\".7\" d=\"M";
-    for (std::size_t i = 0; i < picture.path.size(); ++i) svg += (i == 0 ? "" : "L") + to_page(picture.path[i]);
+    for (std::size_t i = 0; i < picture.path.size(); ++i)
+      svg += (i == 0 ? "" : "L") + to_page(picture.path[i]);
     svg += "\"/>\n";
   }
   svg += "<path fill=\"none\" stroke=\"black\" stroke-linecap=\"round\" stroke-width=\"" +
@@ -195,7 +202,8 @@ std::string picture_at(const PointPicture& picture, double left, double top, dou
   return svg + "\"/>\n";
 }
 
-/// The legend is at the top, on the emptier side: on the left if most points of the upper half are on the right.
+/// The legend is at the top, on the emptier side: on the left if most points of the upper half are on the
+/// right.
 bool is_upper_half_full_on_the_right(const Plot& plot, const Axis& x, const Axis& y) {
   std::ptrdiff_t balance = 0;
   for (const PlotSeries& series : plot.series)
@@ -230,8 +238,9 @@ std::string svg_of(const Plot& plot) {
   double below = kTopMargin + 16;
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     if (plot.series[i].name.empty()) continue;
-    svg += text_at(legend_x, below, plot.series[i].name,
-                   "text-anchor=\"" + anchor + "\" fill=\"" + std::string(kColors[i % kColors.size()]) + "\"");
+    svg +=
+        text_at(legend_x, below, plot.series[i].name,
+                "text-anchor=\"" + anchor + "\" fill=\"" + std::string(kColors[i % kColors.size()]) + "\"");
     below += 16;
   }
   return svg + "</svg>\n";
@@ -241,7 +250,8 @@ std::string svg_of(std::span<const PointPicture> pictures, const std::string& ti
   constexpr double kSize = 360;
   constexpr double kGap = 24;
   constexpr double kHead = 56;
-  std::string svg = opening(kGap + static_cast<double>(pictures.size()) * (kSize + kGap), kSize + kHead + kGap);
+  std::string svg =
+      opening(kGap + static_cast<double>(pictures.size()) * (kSize + kGap), kSize + kHead + kGap);
   svg += text_at(kGap, 22, title, "font-size=\"15\"");
   for (std::size_t i = 0; i < pictures.size(); ++i)
     svg += picture_at(pictures[i], kGap + static_cast<double>(i) * (kSize + kGap), kHead, kSize);

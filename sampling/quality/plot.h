@@ -39,7 +39,8 @@ struct PointPicture {
 /// Several side by side.
 std::string svg_of(std::span<const PointPicture> pictures, const std::string& title = {});
 
-/// Parallel projection from (1, turn_deg around +z, height_deg above the xy plane) onto a plane; y of the result is up.
+/// Parallel projection from (1, turn_deg around +z, height_deg above the xy plane) onto a plane; y of the
+/// result is up.
 Eigen::Vector2d project(const Eigen::Vector3d& place, double turn_deg, double height_deg);
 
 /// @throws InputError with the name of the file if it cannot be written.

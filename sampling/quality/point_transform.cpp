@@ -52,7 +52,8 @@ std::vector<double> spread(std::span<const Eigen::Vector2d> points, std::size_t 
     const Footprint x(point.x(), size), y(point.y(), size);
     for (std::size_t j = 0; j < y.values.size(); ++j) {
       double* row = grid.data() + (y.first + j) % size * size;
-      for (std::size_t i = 0; i < x.values.size(); ++i) row[(x.first + i) % size] += x.values[i] * y.values[j];
+      for (std::size_t i = 0; i < x.values.size(); ++i)
+        row[(x.first + i) % size] += x.values[i] * y.values[j];
     }
   }
   return grid;

@@ -10,7 +10,8 @@
 #include <span>
 #include <vector>
 
-/// Points in a balanced tree of tight boxes: counts within shapes and nearest points, for plane and space alike.
+/// Points in a balanced tree of tight boxes: counts within shapes and nearest points, for plane and space
+/// alike.
 namespace hilbrush {
 
 /// How much of a box is inside a shape.
@@ -40,8 +41,8 @@ class PointTree {
 
   std::size_t size() const { return entries_.size(); }
 
-  /// The number of points inside `shape`, which has `overlap(box)` and `contains(point)`. Cost O(sqrt n) in the
-  /// plane, O(n^2/3) in space, if the shape's border is short.
+  /// The number of points inside `shape`, which has `overlap(box)` and `contains(point)`. Cost O(sqrt n) in
+  /// the plane, O(n^2/3) in space, if the shape's border is short.
   template <class Shape>
   std::size_t count(const Shape& shape) const {
     return entries_.empty() ? 0 : count_below(shape, 0, 0, entries_.size());
@@ -55,9 +56,9 @@ class PointTree {
     });
   }
 
-  /// The point with the least cost2(index, squared distance, least so far). A cost must not be less than the squared
-  /// distance, because it is asked for only where that is less than the least cost so far. The square root of the cost
-  /// is returned as the distance.
+  /// The point with the least cost2(index, squared distance, least so far). A cost must not be less than the
+  /// squared distance, because it is asked for only where that is less than the least cost so far. The square
+  /// root of the cost is returned as the distance.
   template <class Cost>
   Nearest cheapest(const Point& place, Cost&& cost2) const {
     Nearest best;
@@ -92,11 +93,12 @@ class PointTree {
       int axis = 0;
       box.sizes().maxCoeff(&axis);
       // Equal coordinates in the order given, so that the tree does not depend on how the library selects.
-      std::nth_element(entries_.begin() + static_cast<std::ptrdiff_t>(begin),
-                       entries_.begin() + static_cast<std::ptrdiff_t>(middle),
-                       entries_.begin() + static_cast<std::ptrdiff_t>(end), [axis](const Entry& a, const Entry& b) {
-                         return a.place[axis] < b.place[axis] || (a.place[axis] == b.place[axis] && a.index < b.index);
-                       });
+      std::nth_element(
+          entries_.begin() + static_cast<std::ptrdiff_t>(begin),
+          entries_.begin() + static_cast<std::ptrdiff_t>(middle),
+          entries_.begin() + static_cast<std::ptrdiff_t>(end), [axis](const Entry& a, const Entry& b) {
+            return a.place[axis] < b.place[axis] || (a.place[axis] == b.place[axis] && a.index < b.index);
+          });
     }
     const auto lower = [&] { build(2 * node + 1, begin, middle); };
     const auto upper = [&] { build(2 * node + 2, middle, end); };
@@ -158,7 +160,8 @@ class PointTree {
     if (begin == end || boxes_[node].squaredExteriorDistance(center) > radius2) return;
     if (is_leaf(node)) {
       for (std::size_t i = begin; i < end; ++i)
-        if ((entries_[i].place - center).squaredNorm() <= radius2) visit(entries_[i].index, entries_[i].place);
+        if ((entries_[i].place - center).squaredNorm() <= radius2)
+          visit(entries_[i].index, entries_[i].place);
       return;
     }
     const std::size_t middle = begin + (end - begin) / 2;
@@ -198,7 +201,8 @@ struct HalfSpaces {
       const double middle = normals[k].dot(box.center()) - offsets[k];
       const double reach = .5 * normals[k].cwiseAbs().dot(box.sizes());
       if (middle + reach <= 0) return Overlap::kOutside;
-      // Boxes that touch a plane within rounding count as partly inside, so their points are tested one by one.
+      // Boxes that touch a plane within rounding count as partly inside, so their points are tested one by
+      // one.
       if (middle - reach <= 1e-12 * normals[k].norm()) result = Overlap::kPartly;
     }
     return result;

@@ -20,7 +20,8 @@ Spacing spacing_of(std::span<const Eigen::Matrix<double, kDimension, 1>> points,
   const double densest = densest_packing_distance(area / static_cast<double>(points.size()));
   std::vector<double> distances(points.size());
   tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t i) {
-    distances[i] = tree.nearest(points[i], [i](std::uint32_t other) { return other != i; }).distance / densest;
+    distances[i] =
+        tree.nearest(points[i], [i](std::uint32_t other) { return other != i; }).distance / densest;
   });
   return spacing_figures(std::move(distances));
 }

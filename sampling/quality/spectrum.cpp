@@ -46,8 +46,10 @@ void SpectrumSums::add(const Vector2d& frequency, double power) {
   if (radius < .5) half_.add(power);
   if (radius < .25) quarter_.add(power);
   if (directions_.empty() || std::abs(radius - 1) > .1) return;
-  const double turn = std::atan2(frequency.y(), frequency.x()) / std::numbers::pi;  // -1..1; a half turn is the same
-  const auto sector = static_cast<std::size_t>((turn - std::floor(turn)) * static_cast<double>(directions_.size()));
+  const double turn =
+      std::atan2(frequency.y(), frequency.x()) / std::numbers::pi;  // -1..1; a half turn is the same
+  const auto sector =
+      static_cast<std::size_t>((turn - std::floor(turn)) * static_cast<double>(directions_.size()));
   directions_[std::min(sector, directions_.size() - 1)].add(power);
 }
 
@@ -56,8 +58,8 @@ Spectrum SpectrumSums::result() const {
   for (std::size_t i = 0; i < rings_.size(); ++i) {
     const double mean = rings_[i].mean();
     const double variance = rings_[i].count > 0 ? rings_[i].square / rings_[i].count - mean * mean : 0;
-    spectrum.rings.push_back({(static_cast<double>(i) + .5) * kHighest / static_cast<double>(rings_.size()), mean,
-                              mean > 0 ? std::max(0., variance) / (mean * mean) : 0});
+    spectrum.rings.push_back({(static_cast<double>(i) + .5) * kHighest / static_cast<double>(rings_.size()),
+                              mean, mean > 0 ? std::max(0., variance) / (mean * mean) : 0});
   }
   for (const Sum& sum : directions_) spectrum.directions.push_back(sum.mean());
   spectrum.below_half = half_.mean();
@@ -70,7 +72,8 @@ void complete_spectrum(Spectrum& spectrum) {
   spectrum.peak = spectrum.anisotropy = 0;
   for (const Spectrum::Ring& ring : spectrum.rings) spectrum.peak = std::max(spectrum.peak, ring.power);
   double mean = 0;
-  for (const double power : spectrum.directions) mean += power / static_cast<double>(spectrum.directions.size());
+  for (const double power : spectrum.directions)
+    mean += power / static_cast<double>(spectrum.directions.size());
   if (!(mean > 0)) return;
   for (const double power : spectrum.directions)
     spectrum.anisotropy = std::max(spectrum.anisotropy, std::abs(power / mean - 1));

@@ -46,10 +46,13 @@ std::vector<std::uint32_t> count_on_triangles(std::size_t triangle_count, Sets s
 class Grower {
  public:
   Grower(const SurfaceQuality::Implementation& surface, const Fans& fans)
-      : surface_(surface), fans_(fans), taken_(surface.masses.size(), false), seen_(fans.begin.size() - 1, false) {}
+      : surface_(surface),
+        fans_(fans),
+        taken_(surface.masses.size(), false),
+        seen_(fans.begin.size() - 1, false) {}
 
-  /// Calls take(triangle) ring by ring around `vertex`, until the mass reaches `wanted` or the component ends. Returns
-  /// the mass.
+  /// Calls take(triangle) ring by ring around `vertex`, until the mass reaches `wanted` or the component
+  /// ends. Returns the mass.
   template <class Take>
   double grow(std::uint32_t vertex, double wanted, const Take& take) {
     queue_.assign(1, vertex);
@@ -99,21 +102,24 @@ std::vector<Discrepancy> SurfaceQuality::triangle_sets(Sets sets, const TestShap
   std::vector<std::vector<double>> errors(sets.size(), std::vector<double>(shapes.count));
 
   constexpr std::size_t kShapesPerGrower = 16;
-  tbb::parallel_for(std::size_t{0}, (shapes.count + kShapesPerGrower - 1) / kShapesPerGrower, [&](std::size_t group) {
-    Grower grower(surface, fans);
-    std::vector<std::uint64_t> sums(sets.size());
-    for (std::size_t i = group * kShapesPerGrower; i < std::min(shapes.count, (group + 1) * kShapesPerGrower); ++i) {
-      const ShapeNumbers number(shapes, 6, i);
-      std::fill(sums.begin(), sums.end(), 0u);
-      const double mass =
-          grower.grow(random_vertex(surface.mesh, fans, number), number(0) * surface.mass, [&](std::uint32_t t) {
-            const std::uint32_t* row = counts.data() + t * sets.size();
-            for (std::size_t s = 0; s < sums.size(); ++s) sums[s] += row[s];
-          });
-      for (std::size_t s = 0; s < sets.size(); ++s)
-        errors[s][i] = static_cast<double>(sums[s]) / static_cast<double>(sets[s].size()) - mass / surface.mass;
-    }
-  });
+  tbb::parallel_for(
+      std::size_t{0}, (shapes.count + kShapesPerGrower - 1) / kShapesPerGrower, [&](std::size_t group) {
+        Grower grower(surface, fans);
+        std::vector<std::uint64_t> sums(sets.size());
+        for (std::size_t i = group * kShapesPerGrower;
+             i < std::min(shapes.count, (group + 1) * kShapesPerGrower); ++i) {
+          const ShapeNumbers number(shapes, 6, i);
+          std::fill(sums.begin(), sums.end(), 0u);
+          const double mass = grower.grow(random_vertex(surface.mesh, fans, number), number(0) * surface.mass,
+                                          [&](std::uint32_t t) {
+                                            const std::uint32_t* row = counts.data() + t * sets.size();
+                                            for (std::size_t s = 0; s < sums.size(); ++s) sums[s] += row[s];
+                                          });
+          for (std::size_t s = 0; s < sets.size(); ++s)
+            errors[s][i] =
+                static_cast<double>(sums[s]) / static_cast<double>(sets[s].size()) - mass / surface.mass;
+        }
+      });
   std::vector<Discrepancy> result;
   for (const auto& of_set : errors) result.push_back(discrepancy_of(of_set));
   return result;

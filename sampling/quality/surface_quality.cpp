@@ -90,12 +90,13 @@ std::vector<Vector2d> polygon_like_disc(double radius) {
   const double step = 2 * std::numbers::pi / kSides;
   const double stretched = radius * std::sqrt(step / std::sin(step));
   std::vector<Vector2d> polygon;
-  for (int i = 0; i < kSides; ++i) polygon.emplace_back(stretched * std::cos(i * step), stretched * std::sin(i * step));
+  for (int i = 0; i < kSides; ++i)
+    polygon.emplace_back(stretched * std::cos(i * step), stretched * std::sin(i * step));
   return polygon;
 }
 
-/// The mass of a convex polygon in barycentric coordinates: of fans from its first corner that have no more corners
-/// than a tone can integrate at once.
+/// The mass of a convex polygon in barycentric coordinates: of fans from its first corner that have no more
+/// corners than a tone can integrate at once.
 double mass_of_polygon(const ToneField& tone, std::uint32_t triangle, const std::vector<Vector2d>& polygon) {
   constexpr std::size_t kStep = kMaxPolygonCorners - 2;
   double mass = 0;
@@ -117,7 +118,8 @@ double disc_triangle_area(double radius, const Vector2d& a, const Vector2d& b, c
 SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const ToneField* t)
     : Implementation(m, t, measure_masses(m, t)) {}
 
-SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const ToneField* t, TriangleMasses measured)
+SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const ToneField* t,
+                                               TriangleMasses measured)
     : mesh(m),
       tone(t),
       is_even(std::move(measured.is_even)),
@@ -127,7 +129,8 @@ SurfaceQuality::Implementation::Implementation(const TexturedMesh& m, const Tone
   mass_sums.resize(masses.size());
   std::partial_sum(masses.begin(), masses.end(), mass_sums.begin());
   mass = mass_sums.empty() ? 0 : mass_sums.back();
-  if (!(mass > 0)) throw InputError("", "there is nothing to cover: the surface has no area or asks for no dots");
+  if (!(mass > 0))
+    throw InputError("", "there is nothing to cover: the surface has no area or asks for no dots");
   const auto box = bounds(mesh);
   diagonal_m = (box[1] - box[0]).norm();
 }
@@ -142,12 +145,13 @@ double SurfaceQuality::Implementation::mass_in_ball(std::uint32_t triangle, cons
   std::array<Vector2d, 3> corners;
   for (int c = 0; c < 3; ++c) corners[static_cast<std::size_t>(c)] = flat(mesh.corner(triangle, c) - center);
   if (is_even[triangle]) {
-    const double share =
-        disc_triangle_area(disc_radius, corners[0], corners[1], corners[2]) / mesh.area_vector(triangle).norm();
+    const double share = disc_triangle_area(disc_radius, corners[0], corners[1], corners[2]) /
+                         mesh.area_vector(triangle).norm();
     return std::clamp(share, 0., 1.) * masses[triangle];
   }
   std::vector<Vector2d> polygon = polygon_like_disc(disc_radius);
-  for (std::size_t c = 0; c < 3 && !polygon.empty(); ++c) polygon = clip(polygon, corners[c], corners[(c + 1) % 3]);
+  for (std::size_t c = 0; c < 3 && !polygon.empty(); ++c)
+    polygon = clip(polygon, corners[c], corners[(c + 1) % 3]);
   if (polygon.size() < 3) return 0;
   Eigen::Matrix2d sides;
   sides << corners[1] - corners[0], corners[2] - corners[0];
@@ -201,8 +205,8 @@ Spacing SurfaceQuality::spacing(std::span<const Dot> dots) const {
   tbb::parallel_for(std::size_t{0}, dots.size(), [&](std::size_t i) {
     const Dot& dot = dots[i];
     const double density = surface.density_at(dot.position_O, dot.triangle);
-    distances[i] =
-        on_surface.distance(dot.position_O, dot.triangle, static_cast<std::uint32_t>(i)) / densest * std::sqrt(density);
+    distances[i] = on_surface.distance(dot.position_O, dot.triangle, static_cast<std::uint32_t>(i)) /
+                   densest * std::sqrt(density);
   });
   return spacing_figures(std::move(distances));
 }
@@ -215,7 +219,8 @@ double SurfaceQuality::largest_hole(std::span<const Dot> dots) const {
   std::vector<SearchTriangle> triangles;
   for (std::uint32_t t = 0; t < surface.mesh.triangle_count(); ++t)
     if (surface.masses[t] > 0)
-      triangles.push_back({{surface.mesh.corner(t, 0), surface.mesh.corner(t, 1), surface.mesh.corner(t, 2)}, t});
+      triangles.push_back(
+          {{surface.mesh.corner(t, 0), surface.mesh.corner(t, 1), surface.mesh.corner(t, 2)}, t});
   const auto distance = [&](const Vector3d& place, std::uint32_t face) {
     const double density = surface.density_at(place, face);
     return density > 0 ? on_surface.distance(place, face) * std::sqrt(density) : 0;

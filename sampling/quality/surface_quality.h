@@ -8,7 +8,8 @@
 
 namespace hilbrush {
 
-/// The mass of each triangle, and whether it is spread evenly over it (a byte, as threads write them side by side).
+/// The mass of each triangle, and whether it is spread evenly over it (a byte, as threads write them side by
+/// side).
 struct TriangleMasses {
   std::vector<double> masses;
   std::vector<std::uint8_t> is_even;
@@ -38,8 +39,10 @@ struct SurfaceQuality::Implementation {
   double density_at(const Eigen::Vector3d& place, std::uint32_t triangle) const;
 };
 
-/// Area that a disc around the origin has in common with the triangle a, b, c (positive if counter-clockwise). Closed
-/// form, side by side: a side gives the signed area of disc and triangle (origin, a, b).
-double disc_triangle_area(double radius, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c);
+/// Area that a disc around the origin has in common with the triangle a, b, c (positive if
+/// counter-clockwise). Closed form, side by side: a side gives the signed area of disc and triangle (origin,
+/// a, b).
+double disc_triangle_area(double radius, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                          const Eigen::Vector2d& c);
 
 }  // namespace hilbrush

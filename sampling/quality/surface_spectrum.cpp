@@ -32,8 +32,8 @@ constexpr std::size_t kDirections = 8;
 constexpr double kMinCosine = .5;
 /// A patch holds about 300 dots, so with fewer dots than this there is hardly a patch.
 constexpr std::size_t kMinDots = 100;
-/// Longest side of the pieces that stand for the even density, in pitches: their own rows show only above the highest
-/// frequency.
+/// Longest side of the pieces that stand for the even density, in pitches: their own rows show only above the
+/// highest frequency.
 constexpr double kMaxPiecePitches = .45;
 
 struct Weighted {
@@ -54,7 +54,8 @@ double window(double distance_pitches) {
   return s <= 0 ? 0 : s * s;
 }
 
-/// The tangent plane around a surface point; lengths are those of chords, so that a bent surface keeps its extent.
+/// The tangent plane around a surface point; lengths are those of chords, so that a bent surface keeps its
+/// extent.
 class TangentPlane {
  public:
   TangentPlane(const Vector3d& center, const Vector3d& normal, double turn, double pitch)
@@ -79,7 +80,8 @@ class TangentPlane {
 
 class PatchMaker {
  public:
-  PatchMaker(const SurfaceQuality::Implementation& surface, std::span<const Dot> dots, const PointTree<3>& tree)
+  PatchMaker(const SurfaceQuality::Implementation& surface, std::span<const Dot> dots,
+             const PointTree<3>& tree)
       : surface_(surface),
         dots_(dots),
         tree_(tree),
@@ -87,15 +89,17 @@ class PatchMaker {
 
   FlatPatch make(const SurfacePoint& center, double turn) const {
     const double pitch = pitch_ / std::sqrt(std::max(surface_.density(center), 1e-6));
-    const TangentPlane plane(position(surface_.mesh, center), face_normal(surface_.mesh, center), turn, pitch);
+    const TangentPlane plane(position(surface_.mesh, center), face_normal(surface_.mesh, center), turn,
+                             pitch);
     FlatPatch patch;
-    const std::unordered_set<std::uint32_t> triangles = connected_triangles(center.triangle, plane, pitch, patch);
+    const std::unordered_set<std::uint32_t> triangles =
+        connected_triangles(center.triangle, plane, pitch, patch);
     if (!patch.is_flat_enough) return patch;
     std::vector<std::uint32_t> ordered(triangles.begin(), triangles.end());
     std::sort(ordered.begin(), ordered.end());
     for (const std::uint32_t t : ordered)
-      add_even(t, {surface_.mesh.corner(t, 0), surface_.mesh.corner(t, 1), surface_.mesh.corner(t, 2)}, plane, pitch,
-               patch);
+      add_even(t, {surface_.mesh.corner(t, 0), surface_.mesh.corner(t, 1), surface_.mesh.corner(t, 2)}, plane,
+               pitch, patch);
     std::vector<std::uint32_t> inside;
     tree_.visit_near(plane.center(), kRadius * pitch, [&](std::uint32_t i, const Vector3d&) {
       if (triangles.contains(dots_[i].triangle)) inside.push_back(i);
@@ -110,14 +114,15 @@ class PatchMaker {
 
  private:
   /// The triangles that the ball touches and that are connected with the center's within it.
-  std::unordered_set<std::uint32_t> connected_triangles(std::uint32_t start, const TangentPlane& plane, double pitch,
-                                                        FlatPatch& patch) const {
+  std::unordered_set<std::uint32_t> connected_triangles(std::uint32_t start, const TangentPlane& plane,
+                                                        double pitch, FlatPatch& patch) const {
     std::unordered_set<std::uint32_t> found{start};
     std::vector<std::uint32_t> open{start};
     while (!open.empty()) {
       const std::uint32_t t = open.back();
       open.pop_back();
-      if (surface_.mesh.area_vector(t).normalized().dot(plane.normal()) < kMinCosine) patch.is_flat_enough = false;
+      if (surface_.mesh.area_vector(t).normalized().dot(plane.normal()) < kMinCosine)
+        patch.is_flat_enough = false;
       for (const TriangleSide& side : surface_.neighbors[t]) {
         if (side == kNoSide || found.contains(side.triangle)) continue;
         const auto corner = [&](int c) -> const Vector3d& { return surface_.mesh.corner(side.triangle, c); };
@@ -132,8 +137,8 @@ class PatchMaker {
   }
 
   /// The even density of a triangle as many small weights.
-  void add_even(std::uint32_t t, const std::array<Vector3d, 3>& corners, const TangentPlane& plane, double pitch,
-                FlatPatch& patch) const {
+  void add_even(std::uint32_t t, const std::array<Vector3d, 3>& corners, const TangentPlane& plane,
+                double pitch, FlatPatch& patch) const {
     std::size_t longest = 0;
     double length = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -168,12 +173,13 @@ class PatchMaker {
   double pitch_;
 };
 
-/// The transform of the patch's dots minus its even density: sum of weight * exp(-2 pi i f direction . place) at the
-/// middles of all rings.
-std::array<std::complex<double>, kRings> transform(const Eigen::Matrix2Xd& places, const Eigen::ArrayXd& weights,
-                                                   const Vector2d& direction) {
+/// The transform of the patch's dots minus its even density: sum of weight * exp(-2 pi i f direction . place)
+/// at the middles of all rings.
+std::array<std::complex<double>, kRings> transform(const Eigen::Matrix2Xd& places,
+                                                   const Eigen::ArrayXd& weights, const Vector2d& direction) {
   constexpr double kStep = SpectrumSums::kHighest / kRings;
-  const Eigen::ArrayXd turns = -2 * std::numbers::pi * kStep * (direction.transpose() * places).array().transpose();
+  const Eigen::ArrayXd turns =
+      -2 * std::numbers::pi * kStep * (direction.transpose() * places).array().transpose();
   const Eigen::ArrayXd step_x = turns.cos();
   const Eigen::ArrayXd step_y = turns.sin();
   Eigen::ArrayXd x = weights * (turns / 2).cos(), y = weights * (turns / 2).sin(), next_x;
@@ -210,8 +216,8 @@ std::vector<double> powers(const FlatPatch& patch) {
   return result;
 }
 
-/// Rings, and the means over the discs below half and a quarter of the principal frequency: a ring's weight is its
-/// circumference.
+/// Rings, and the means over the discs below half and a quarter of the principal frequency: a ring's weight
+/// is its circumference.
 Spectrum spectrum_of(const std::vector<double>& ring_powers) {
   Spectrum spectrum;
   double half = 0;
@@ -261,7 +267,8 @@ Spectrum SurfaceQuality::spectrum(std::span<const Dot> dots, std::uint64_t seed)
     for (std::size_t k = 0; k < patch.size(); ++k) rings[k % kRings] += patch[k];
   }
   if (!(count > 0))
-    throw InputError("", "no part of the surface is flat enough for a spectrum: more dots make smaller patches");
+    throw InputError("",
+                     "no part of the surface is flat enough for a spectrum: more dots make smaller patches");
   for (double& power : rings) power /= count;
   return spectrum_of(rings);
 }

@@ -31,7 +31,8 @@ TriangleTree::TriangleTree(const TexturedMesh& mesh, std::span<const double> mas
   build(masses, 0, 0, order_.size());
 }
 
-void TriangleTree::build(std::span<const double> masses, std::size_t node, std::size_t begin, std::size_t end) {
+void TriangleTree::build(std::span<const double> masses, std::size_t node, std::size_t begin,
+                         std::size_t end) {
   Eigen::AlignedBox3d middles;
   for (std::size_t i = begin; i < end; ++i) {
     const Eigen::AlignedBox3d box = box_of(mesh_, order_[i]);
@@ -49,7 +50,8 @@ void TriangleTree::build(std::span<const double> masses, std::size_t node, std::
     const auto key = [&](std::uint32_t triangle) { return box_of(mesh_, triangle).center()[axis]; };
     std::nth_element(order_.begin() + static_cast<std::ptrdiff_t>(begin),
                      order_.begin() + static_cast<std::ptrdiff_t>(middle),
-                     order_.begin() + static_cast<std::ptrdiff_t>(end), [&](std::uint32_t a, std::uint32_t b) {
+                     order_.begin() + static_cast<std::ptrdiff_t>(end),
+                     [&](std::uint32_t a, std::uint32_t b) {
                        const double ka = key(a);
                        const double kb = key(b);
                        return ka < kb || (ka == kb && a < b);
@@ -70,8 +72,9 @@ void TriangleTree::search(const Vector3d& place, std::size_t node, std::size_t b
                           Candidate& best) const {
   if (is_leaf(node)) {
     for (std::size_t i = begin; i < end; ++i) {
-      const SurfacePoint point{order_[i], nearest_in_triangle(place, mesh_.corner(order_[i], 0),
-                                                              mesh_.corner(order_[i], 1), mesh_.corner(order_[i], 2))};
+      const SurfacePoint point{
+          order_[i], nearest_in_triangle(place, mesh_.corner(order_[i], 0), mesh_.corner(order_[i], 1),
+                                         mesh_.corner(order_[i], 2))};
       const double distance2 = (position(mesh_, point) - place).squaredNorm();
       if (distance2 < best.distance2) best = {point, distance2};
     }

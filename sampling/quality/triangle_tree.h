@@ -6,8 +6,8 @@
 
 #include "sampling/model/textured_mesh.h"
 
-/// The triangles of a mesh in a balanced tree of boxes: finds the part of the surface within a ball and its nearest
-/// point.
+/// The triangles of a mesh in a balanced tree of boxes: finds the part of the surface within a ball and its
+/// nearest point.
 namespace hilbrush {
 
 class TriangleTree {
@@ -15,8 +15,8 @@ class TriangleTree {
   /// Keeps a reference to `mesh`. `masses` has one value for each triangle, see mass_within. Cost O(n log n).
   TriangleTree(const TexturedMesh& mesh, std::span<const double> masses);
 
-  /// Sum of the masses of the triangles within the ball; for those that are only partly in it, `partly(triangle)` is
-  /// added.
+  /// Sum of the masses of the triangles within the ball; for those that are only partly in it,
+  /// `partly(triangle)` is added.
   template <class Partly>
   double mass_within(const Eigen::Vector3d& center, double radius, const Partly& partly) const {
     return mass_below({center, radius}, partly, 0, 0, order_.size());

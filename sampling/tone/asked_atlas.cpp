@@ -41,8 +41,9 @@ AtlasLayout::AtlasLayout(const TexturedMesh& mesh, double spacing_m, double texe
 void AtlasLayout::pack() {
   std::vector<std::uint32_t> order(rectangles_.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return rectangles_[a].rows > rectangles_[b].rows; });
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return rectangles_[a].rows > rectangles_[b].rows;
+  });
   double area = 0;
   int widest = 1;
   for (const Rectangle& r : rectangles_) {

@@ -5,12 +5,13 @@
 #include "sampling/tone/tone_layer.h"
 #include "sampling/tone/triangle_frame.h"
 
-/// An atlas: every triangle has a rectangle of texels of its own, which no other triangle touches. A mesh's own texture
-/// coordinates overlap, tile and mirror, so that one texel is many places; here a texel is one place.
+/// An atlas: every triangle has a rectangle of texels of its own, which no other triangle touches. A mesh's
+/// own texture coordinates overlap, tile and mirror, so that one texel is many places; here a texel is one
+/// place.
 namespace hilbrush {
 
-/// Where each triangle lies in the atlas. Texels are nodes of a grid along the triangle's longest edge, at most
-/// `spacing_m` apart, with nodes on its corners.
+/// Where each triangle lies in the atlas. Texels are nodes of a grid along the triangle's longest edge, at
+/// most `spacing_m` apart, with nodes on its corners.
 class AtlasLayout {
  public:
   struct Rectangle {
@@ -18,13 +19,16 @@ class AtlasLayout {
     int columns = 0, rows = 0;
   };
 
-  /// Keeps a reference to `mesh`. Should it take more than `texel_limit` texels, the spacing grows until it does not.
+  /// Keeps a reference to `mesh`. Should it take more than `texel_limit` texels, the spacing grows until it
+  /// does not.
   AtlasLayout(const TexturedMesh& mesh, double spacing_m, double texel_limit);
 
   const TexturedMesh& mesh() const { return mesh_; }
   int width() const { return width_; }
   int height() const { return height_; }
-  std::size_t texel_count() const { return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_); }
+  std::size_t texel_count() const {
+    return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  }
   const Rectangle& rectangle(std::uint32_t triangle) const { return rectangles_[triangle]; }
   std::size_t texel_index(const Rectangle& r, int column, int row) const {
     return static_cast<std::size_t>(r.y + row) * static_cast<std::size_t>(width_) +

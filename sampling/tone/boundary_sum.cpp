@@ -3,8 +3,8 @@
 namespace hilbrush {
 namespace {
 
-/// Four numbers side by side: one register with AVX2, two without. No products are fused, so that both give the same
-/// bits.
+/// Four numbers side by side: one register with AVX2, two without. No products are fused, so that both give
+/// the same bits.
 using Four = double __attribute__((vector_size(BoundarySum::kLanes * sizeof(double))));
 
 /// Gauss, three places about the middle of a piece: exact to degree 5.
@@ -16,7 +16,8 @@ struct FourTotals {
 };
 
 /// Vectors go by reference: how they are returned differs between machines.
-[[gnu::always_inline]] inline void load(Four& four, const BoundarySum::Pieces::Numbers& numbers, std::size_t i) {
+[[gnu::always_inline]] inline void load(Four& four, const BoundarySum::Pieces::Numbers& numbers,
+                                        std::size_t i) {
   __builtin_memcpy(&four, &numbers[i], sizeof four);
 }
 
@@ -48,7 +49,8 @@ struct FourCells {
     sum.mass += weighted;
     sum.first_x += weight * (xf + t * xg_xf + left * here + s * s * (.5 * level + third));
     sum.first_y += weighted * (low + t);
-    sum.square += weight * (u * (u * ff + t * (2 * fg)) + t * t * gg + s * (level * level + bend * (level + third)));
+    sum.square +=
+        weight * (u * (u * ff + t * (2 * fg)) + t * t * gg + s * (level * level + bend * (level + third)));
   }
 
   Four a, across, up, twist;  // the tone is a + s across + t up + s t twist
@@ -60,7 +62,8 @@ struct FourCells {
   return (four[0] + four[1]) + (four[2] + four[3]);
 }
 
-[[gnu::always_inline]] inline void add_up(const BoundarySum::Pieces& pieces, std::size_t count, TexelIntegral& total) {
+[[gnu::always_inline]] inline void add_up(const BoundarySum::Pieces& pieces, std::size_t count,
+                                          TexelIntegral& total) {
   FourTotals totals{};
   for (std::size_t i = 0; i < count; i += BoundarySum::kLanes) {
     const FourCells cells(&pieces.cells[i]);

@@ -4,13 +4,14 @@
 
 #include "sampling/tone/texel_integral.h"
 
-/// Integrals of a bilinear tone over a polygon, as sums over straight pieces of its boundary (Green's theorem), each
-/// piece within one cell of the grid of texel centers. Along a piece the integrands are polynomials of degree at most
-/// 5: Gauss's three places are exact. Pieces are gathered and summed four side by side.
+/// Integrals of a bilinear tone over a polygon, as sums over straight pieces of its boundary (Green's
+/// theorem), each piece within one cell of the grid of texel centers. Along a piece the integrands are
+/// polynomials of degree at most 5: Gauss's three places are exact. Pieces are gathered and summed four side
+/// by side.
 namespace hilbrush {
 
-/// Integrals along x, from the column where the polygon begins to the left side of a cell, of f (the tone on the row's
-/// lower side), g (on its upper side) and their products.
+/// Integrals along x, from the column where the polygon begins to the left side of a cell, of f (the tone on
+/// the row's lower side), g (on its upper side) and their products.
 struct RowSums {
   double f, g, xf, xg, ff, fg, gg;
 };
@@ -24,8 +25,8 @@ struct BoundaryCell {
 
 class BoundarySum {
  public:
-  /// A piece that begins at (s, t), from the cell's lower left corner, and goes (ds, dt). `cell` has to stay until the
-  /// sum is taken or kMax more pieces are added.
+  /// A piece that begins at (s, t), from the cell's lower left corner, and goes (ds, dt). `cell` has to stay
+  /// until the sum is taken or kMax more pieces are added.
   void add(double s, double t, double ds, double dt, const BoundaryCell& cell) {
     if (count_ == kMax) flush();
     pieces_.s[count_] = s, pieces_.t[count_] = t, pieces_.ds[count_] = ds, pieces_.dt[count_] = dt;

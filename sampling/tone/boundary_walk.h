@@ -38,11 +38,10 @@ class Crossings {
 };
 
 /// Adds the edge from p to q to a sum. `Cells` knows the cells; all coordinates are relative to its origin:
-///   std::int64_t column_of(double x, double step), row_of(double y, double step)   of a walk in that direction
-///   void enter(std::int64_t column, std::int64_t row)
-///   bool has_next_column(double step), has_next_row(double step)   there is one in that direction
-///   void step(int columns, int rows)   to a neighbor
-///   const BoundaryCell& here()        valid as BoundarySum::add() asks
+///   std::int64_t column_of(double x, double step), row_of(double y, double step)   of a walk in that
+///   direction void enter(std::int64_t column, std::int64_t row) bool has_next_column(double step),
+///   has_next_row(double step)   there is one in that direction void step(int columns, int rows)   to a
+///   neighbor const BoundaryCell& here()        valid as BoundarySum::add() asks
 template <class Cells>
 void add_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, Cells& cells, BoundarySum& sum) {
   const Eigen::Vector2d d = q - p;

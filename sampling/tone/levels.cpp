@@ -11,14 +11,15 @@
 namespace hilbrush {
 namespace {
 
-/// Width, in wanted tone, of the ramp by which the density falls where the next level takes over: a curve has no
-/// jumps.
+/// Width, in wanted tone, of the ramp by which the density falls where the next level takes over: a curve has
+/// no jumps.
 constexpr double kRamp = 1e-5;
 
 /// Energy a dot here stands for: coverage asked over dots placed, within half a pitch and the dot's triangle.
 double local_energy(const Dot& dot, double pitch_m, const ToneField& asked, const ToneField& density) {
   const TriangleFrame frame(asked.mesh(), dot.triangle);
-  const Eigen::Vector2d center = frame.place(foot_of_perpendicular(asked.mesh(), dot.triangle, dot.position_O).barycentric),
+  const Eigen::Vector2d center = frame.place(
+                            foot_of_perpendicular(asked.mesh(), dot.triangle, dot.position_O).barycentric),
                         half = Eigen::Vector2d::Constant(pitch_m / 2);
   const BoxedPolygon around = frame.clip_box(center - half, center + half);
   const double dots = density.integrate(dot.triangle, around.corners()).mass;
@@ -30,8 +31,9 @@ double nearest_level(std::span<const double> levels, double energy) {
                            [&](double a, double b) { return std::abs(a - energy) < std::abs(b - energy); });
 }
 
-/// Where the tone changes within the box of a dot, its energy is an estimate. What the estimates miss of the total, a
-/// few thousandths, is shared among these dots; those in flat tone have one level exactly and keep it.
+/// Where the tone changes within the box of a dot, its energy is an estimate. What the estimates miss of the
+/// total, a few thousandths, is shared among these dots; those in flat tone have one level exactly and keep
+/// it.
 void share_missing_energy(DotSequence& dots, const ToneField& asked, std::span<const double> levels) {
   constexpr double kFlat = 1e-3;
   double total = 0;
@@ -63,7 +65,8 @@ std::vector<double> energy_levels(int count, double asked_max) {
 
 std::size_t level_for(std::span<const double> levels, double asked) {
   constexpr double kRounding = 1e-9;  // a tone at the very end of a level still belongs to it
-  const auto enough = std::lower_bound(levels.begin(), levels.end() - 1, asked / kEnoughDots * (1 - kRounding));
+  const auto enough =
+      std::lower_bound(levels.begin(), levels.end() - 1, asked / kEnoughDots * (1 - kRounding));
   return static_cast<std::size_t>(enough - levels.begin());
 }
 

@@ -14,10 +14,12 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Sigma of the mean, in pitches. Smaller ones ask for too much of textures finer than a pitch, larger ones for too
-/// little of lines as wide as one: of .35, .5, .7 and 1 this has the least error of tone over pictures of both kinds.
+/// Sigma of the mean, in pitches. Smaller ones ask for too much of textures finer than a pitch, larger ones
+/// for too little of lines as wide as one: of .35, .5, .7 and 1 this has the least error of tone over
+/// pictures of both kinds.
 constexpr double kMeanSigma = .5;
-/// Sigma of the detail: what is finer than dots can show only clumps them (2 to 3 dB of F2 on lines of half a pitch).
+/// Sigma of the detail: what is finer than dots can show only clumps them (2 to 3 dB of F2 on lines of half a
+/// pitch).
 constexpr double kDetailSigma = .25;
 /// Gaussians end here. What is asked for spills over an edge as far as the detail's.
 constexpr double kMeanCutSigmas = 3, kDetailCutSigmas = 2;
@@ -30,7 +32,8 @@ struct Image {
   int width = 0, height = 0;
   std::vector<float> texels;
 
-  Image(int w, int h) : width(w), height(h), texels(static_cast<std::size_t>(w) * static_cast<std::size_t>(h)) {}
+  Image(int w, int h)
+      : width(w), height(h), texels(static_cast<std::size_t>(w) * static_cast<std::size_t>(h)) {}
   float* row(int y) { return texels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width); }
   const float* row(int y) const {
     return texels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
@@ -40,7 +43,8 @@ struct Image {
 /// Texels of a row of `from` that a texel of a row of `to` texels covers, in order, with their shares.
 template <class Visit>
 void visit_covered(int i, int from, int to, Visit visit) {
-  const double scale = static_cast<double>(from) / to, begin = i * scale, end = std::min((i + 1) * scale, from * 1.);
+  const double scale = static_cast<double>(from) / to, begin = i * scale,
+               end = std::min((i + 1) * scale, from * 1.);
   for (int k = static_cast<int>(begin); k < end; ++k) {
     const double covered = std::min(end, k + 1.) - std::max(begin, k * 1.);
     if (covered > 0) visit(k, static_cast<float>(covered / scale));
@@ -85,7 +89,8 @@ std::vector<float> gaussian_taps(double sigma, double cut) {
   const int reach = static_cast<int>(std::floor(cut * sigma));
   double sum = 1;
   for (int k = 1; k <= reach; ++k) sum += 2 * std::exp(-.5 * k * k / (sigma * sigma));
-  for (int k = 1; k <= reach; ++k) taps.push_back(static_cast<float>(std::exp(-.5 * k * k / (sigma * sigma)) / sum));
+  for (int k = 1; k <= reach; ++k)
+    taps.push_back(static_cast<float>(std::exp(-.5 * k * k / (sigma * sigma)) / sum));
   return taps;
 }
 
@@ -101,7 +106,8 @@ void blur_rows(Image& image, const std::vector<float>& taps, bool repeats) {
     const float* center = padded.data() + reach;
     for (int k = 1; k <= reach; ++k) {
       const float tap = taps[static_cast<std::size_t>(k - 1)];
-      for (int x = 0; x < image.width; ++x) row[x] += tap * ((center[x - k] - center[x]) + (center[x + k] - center[x]));
+      for (int x = 0; x < image.width; ++x)
+        row[x] += tap * ((center[x - k] - center[x]) + (center[x + k] - center[x]));
     }
   });
 }
@@ -145,7 +151,8 @@ PitchInTexture round_to_steps(const Vector2d& texels_per_pitch, double octaves, 
     const double most = kGridTexelsPerPitch * (axis == 0 ? width : height);
     const double texels = texels_per_pitch[axis] < most ? texels_per_pitch[axis] : most;
     if (texels >= kMinTexelsPerPitch)
-      result.steps[static_cast<std::size_t>(axis)] = static_cast<int>(std::lround(std::log2(texels) / octaves));
+      result.steps[static_cast<std::size_t>(axis)] =
+          static_cast<int>(std::lround(std::log2(texels) / octaves));
   }
   return result;
 }
@@ -170,8 +177,8 @@ AskedGrid asked_grid(int width, int height, const PitchInTexture& pitch, double 
   return grid;
 }
 
-ToneLayer asked_over_pitch(const std::vector<float>& wanted, int width, int height, TexelAddressing addressing,
-                           const AskedGrid& grid, const ToneCurve& curve) {
+ToneLayer asked_over_pitch(const std::vector<float>& wanted, int width, int height,
+                           TexelAddressing addressing, const AskedGrid& grid, const ToneCurve& curve) {
   CHECK_EQ(wanted.size(), static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   const Image tones = refine(reduce(wanted.data(), width, height, grid.reduced), grid, addressing);
   Image details = blur(tones, grid, kDetailSigma, kDetailCutSigmas, addressing);

@@ -16,15 +16,17 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// A triangle that spans more texels than this repeats its texture beyond all sense and is painted in its mean tone.
+/// A triangle that spans more texels than this repeats its texture beyond all sense and is painted in its
+/// mean tone.
 constexpr double kMaxTexels = 1 << 16;
-/// Least height, in texels, that a triangle gets in its texture: one that is collapsed there would have no polygons to
-/// integrate over.
+/// Least height, in texels, that a triangle gets in its texture: one that is collapsed there would have no
+/// polygons to integrate over.
 constexpr double kMinTexels = 1e-3;
 /// Of all layers together, about; and the finest that a texel is cut, along a side.
 constexpr double kRefinedTexels = 12e6;
 constexpr int kMaxRefinement = 15;
-/// With means over a pitch: so many texels for one of the textures', and steps between sizes of a pitch, in octaves.
+/// With means over a pitch: so many texels for one of the textures', and steps between sizes of a pitch, in
+/// octaves.
 constexpr double kAveragedTexels = 2;
 constexpr double kFinestOctaves = .5, kCoarsestOctaves = 16;
 /// What a straight curve may deviate by, as a share of its end.
@@ -73,13 +75,14 @@ ToneField::ToneField(const ToneField& base, AskedAtlas atlas)
 std::vector<ToneField::Look> ToneField::choose_sources() {
   bool any_colored = false;
   for (const auto m : mesh_.material_index)
-    any_colored |=
-        mesh_.materials[m].source == ColorSource::kColors || mesh_.materials[m].source == ColorSource::kTexture;
+    any_colored |= mesh_.materials[m].source == ColorSource::kColors ||
+                   mesh_.materials[m].source == ColorSource::kTexture;
   sources_.resize(mesh_.triangle_count());
   std::vector<Look> looks;
   for (std::uint32_t t = 0; t < mesh_.triangle_count(); ++t) {
     const Material& material = mesh_.materials[mesh_.material_index[t]];
-    if (material.opacity <= 0 || !is_painted_by_untextured_rule(material, options_.untextured, any_colored)) continue;
+    if (material.opacity <= 0 || !is_painted_by_untextured_rule(material, options_.untextured, any_colored))
+      continue;
     const bool has_texture = material.source == ColorSource::kTexture && material.texture >= 0;
     sources_[t] = has_texture ? textured_source(t, material, looks) : Source{Source::kColors, 0};
   }
@@ -87,7 +90,8 @@ std::vector<ToneField::Look> ToneField::choose_sources() {
 }
 
 /// Its layer is the index of its look, until there are layers.
-ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& material, std::vector<Look>& looks) {
+ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& material,
+                                             std::vector<Look>& looks) {
   float factor = -1;
   if (mesh_.textures[static_cast<std::size_t>(material.texture)].channels <= 2) {
     const auto& l = mesh_.corner_luminance[t];
@@ -99,8 +103,8 @@ ToneField::Source ToneField::textured_source(std::uint32_t t, const Material& ma
   if (found == looks.end()) looks.push_back(look);
   const auto p = texel_corners(t);
   for (int k = 0; k < 3; ++k)
-    if (!((p[static_cast<std::size_t>((k + 1) % 3)] - p[static_cast<std::size_t>(k)]).lpNorm<Eigen::Infinity>() <=
-          kMaxTexels))
+    if (!((p[static_cast<std::size_t>((k + 1) % 3)] - p[static_cast<std::size_t>(k)])
+              .lpNorm<Eigen::Infinity>() <= kMaxTexels))
       return {Source::kMean, index};
   return {Source::kTexture, index};
 }
@@ -110,7 +114,8 @@ bool ToneField::is_averaged() const {
   const ToneCurve& curve = options_.curve;
   if (!(options_.pitch_m > 0) || curve.wanted.empty()) return false;
   for (std::size_t k = 0; k < curve.wanted.size(); ++k)
-    if (std::abs(curve.asked[k] - curve.wanted[k] * curve.asked.back()) > kStraight * curve.asked.back()) return true;
+    if (std::abs(curve.asked[k] - curve.wanted[k] * curve.asked.back()) > kStraight * curve.asked.back())
+      return true;
   return false;
 }
 
@@ -143,7 +148,8 @@ void ToneField::make_layers(const std::vector<Look>& looks) {
   });
   const auto layer_of = [&](std::size_t t, double octaves) {
     const Texture& texture = mesh_.textures[static_cast<std::size_t>(looks[sources_[t].layer].texture)];
-    return std::pair(sources_[t].layer, round_to_steps(pitches[t], octaves, texture.width, texture.height).steps);
+    return std::pair(sources_[t].layer,
+                     round_to_steps(pitches[t], octaves, texture.width, texture.height).steps);
   };
   const auto grid_of = [&](const Look& look, const std::array<int, 2>& steps, double octaves) {
     const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
@@ -158,7 +164,8 @@ void ToneField::make_layers(const std::vector<Look>& looks) {
     for (std::size_t t = 0; t < sources_.size(); ++t) {
       if (!is_textured(t)) continue;
       const auto layer = layer_of(t, octaves);
-      if (layers.emplace(layer, 0).second) texels += grid_of(looks[layer.first], layer.second, octaves).texels();
+      if (layers.emplace(layer, 0).second)
+        texels += grid_of(looks[layer.first], layer.second, octaves).texels();
     }
     if (texels <= most_texels || octaves >= kCoarsestOctaves) break;
   }
@@ -175,15 +182,16 @@ void ToneField::make_layers(const std::vector<Look>& looks) {
     if (is_textured(t)) sources_[t].layer = layers.at(layer_of(t, octaves));
 }
 
-/// The curve bends between texels too: black beside white asks for much less in the middle than the mean of both. So
-/// the curve is applied to texels finer by a whole odd factor, whose centers fall on the texture's own and which repeat
-/// its interpolation exactly; as fine as a fair share of memory allows.
+/// The curve bends between texels too: black beside white asks for much less in the middle than the mean of
+/// both. So the curve is applied to texels finer by a whole odd factor, whose centers fall on the texture's
+/// own and which repeat its interpolation exactly; as fine as a fair share of memory allows.
 int ToneField::refinement_of(const Texture& texture) const {
   if (options_.curve.wanted.empty()) return 1;
   const double share = kRefinedTexels / static_cast<double>(mesh_.textures.size());
   const double texels = static_cast<double>(texture.width) * texture.height;
   int refinement = 1;
-  while (refinement < kMaxRefinement && texels * (refinement + 2) * (refinement + 2) <= share) refinement += 2;
+  while (refinement < kMaxRefinement && texels * (refinement + 2) * (refinement + 2) <= share)
+    refinement += 2;
   return refinement;
 }
 
@@ -221,15 +229,16 @@ std::vector<float> ToneField::wanted_texels(const Look& look) const {
 ToneField::Layer ToneField::make_layer(const Look& look, const std::vector<float>& wanted,
                                        const AskedGrid& grid) const {
   const Texture& texture = mesh_.textures[static_cast<std::size_t>(look.texture)];
-  return {
-      look.luminance_factor,
-      Vector2d(static_cast<double>(grid.size[0]) / texture.width, static_cast<double>(grid.size[1]) / texture.height),
-      asked_over_pitch(wanted, texture.width, texture.height, look.addressing, grid, options_.curve)};
+  return {look.luminance_factor,
+          Vector2d(static_cast<double>(grid.size[0]) / texture.width,
+                   static_cast<double>(grid.size[1]) / texture.height),
+          asked_over_pitch(wanted, texture.width, texture.height, look.addressing, grid, options_.curve)};
 }
 
 double ToneField::coverage(double luminance) const {
   return std::clamp(
-      (options_.reflectance_white - luminance) / (options_.reflectance_white - options_.reflectance_black), 0., 1.);
+      (options_.reflectance_white - luminance) / (options_.reflectance_white - options_.reflectance_black),
+      0., 1.);
 }
 
 bool ToneField::is_blank(std::uint32_t triangle) const {
@@ -246,7 +255,8 @@ std::array<Vector2d, 3> ToneField::texel_corners(std::uint32_t triangle) const {
   const Texture& texture = mesh_.textures[static_cast<std::size_t>(material.texture)];
   auto uv = mesh_.corner_uv[triangle];
   // Whole repeats taken off keep digits for the texels.
-  const Vector2d shift(material.repeat_u ? std::floor(uv[0].x()) : 0, material.repeat_v ? std::floor(uv[0].y()) : 0);
+  const Vector2d shift(material.repeat_u ? std::floor(uv[0].x()) : 0,
+                       material.repeat_v ? std::floor(uv[0].y()) : 0);
   for (Vector2d& p : uv) {
     p -= shift;
     if (!p.allFinite()) p.setZero();
@@ -273,17 +283,19 @@ double ToneField::wanted_of_texture(const SurfacePoint& point) const {
   // The coverage of four texels, divided once.
   const double white = options_.reflectance_white, range = white - options_.reflectance_black;
   return material.opacity / range *
-         look_up(texture.width, texture.height, texel_at(point), addressing(point.triangle), [&](std::size_t i) {
-           return std::clamp(white - factor * texture.luminance[i], 0., range) *
-                  (texture.opacity.empty() ? 1 : texture.opacity[i]);
-         });
+         look_up(texture.width, texture.height, texel_at(point), addressing(point.triangle),
+                 [&](std::size_t i) {
+                   return std::clamp(white - factor * texture.luminance[i], 0., range) *
+                          (texture.opacity.empty() ? 1 : texture.opacity[i]);
+                 });
 }
 
 double ToneField::wanted(const SurfacePoint& point) const {
   const Source source = sources_[point.triangle];
   if (source.kind == Source::kBlank) return 0;
   if (source.kind == Source::kColors)
-    return coverage(interpolated_luminance(point)) * mesh_.materials[mesh_.material_index[point.triangle]].opacity;
+    return coverage(interpolated_luminance(point)) *
+           mesh_.materials[mesh_.material_index[point.triangle]].opacity;
   return wanted_of_texture(point);
 }
 
@@ -302,8 +314,9 @@ double ToneField::asked(const SurfacePoint& point) const {
   if (!atlas_ && source.kind == Source::kMean) return layers_[source.layer].tones.mean();
   const AskedTexels texels = asked_texels(point.triangle);
   const auto& p = texels.corners;
-  return texels.tones.at(point.barycentric[0] * p[0] + point.barycentric[1] * p[1] + point.barycentric[2] * p[2],
-                         texels.addressing);
+  return texels.tones.at(
+      point.barycentric[0] * p[0] + point.barycentric[1] * p[1] + point.barycentric[2] * p[2],
+      texels.addressing);
 }
 
 /// Without a tone curve or an atlas the asked tone is the wanted one, but for what a layer cannot follow.
@@ -357,7 +370,9 @@ ToneIntegral ToneField::integrate_colors(std::uint32_t triangle, std::span<const
   const double scale = 2 * mesh_.area_vector(triangle).norm();
   const auto& l = mesh_.corner_luminance[triangle];
   const double opacity = mesh_.materials[mesh_.material_index[triangle]].opacity;
-  const auto luminance = [&](const Vector2d& b) { return l[0] + b.x() * (l[1] - l[0]) + b.y() * (l[2] - l[0]); };
+  const auto luminance = [&](const Vector2d& b) {
+    return l[0] + b.x() * (l[1] - l[0]) + b.y() * (l[2] - l[0]);
+  };
   const auto tone = [&](const Vector2d& b) { return asked_for(coverage(luminance(b)) * opacity); };
   // The tone bends where the coverage leaves 0 or 1 and at the curve's knots; between two bends it is linear.
   const double white = options_.reflectance_white, black = options_.reflectance_black;

@@ -11,19 +11,20 @@
 #include "sampling/tone/pitch_mean.h"
 #include "sampling/tone/triangle_tone.h"
 
-/// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what fidelity is
-/// measured against) and as asked (after it: the density of dots). Bilinear between texels, linear between vertex
-/// colors. What the curve asks for below a pitch is in pitch_mean.h.
+/// The picture on the surface: coverage at every surface point, as wanted (before the tone curve: what
+/// fidelity is measured against) and as asked (after it: the density of dots). Bilinear between texels,
+/// linear between vertex colors. What the curve asks for below a pitch is in pitch_mean.h.
 namespace hilbrush {
 
 class ToneField {
  public:
-  /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over texels and triangles; four to six
-  /// bytes a texel of the textures, refined where they are small (see refinement_of). With a pitch, one such pass and
-  /// a blur for each size that a pitch has in a texture, up to three times the texels.
+  /// Keeps a reference to `mesh`, which must outlive it. Cost: one pass over texels and triangles; four to
+  /// six bytes a texel of the textures, refined where they are small (see refinement_of). With a pitch, one
+  /// such pass and a blur for each size that a pitch has in a texture, up to three times the texels.
   ToneField(const TexturedMesh& mesh, const ToneOptions& options);
 
-  /// The same picture, asked for otherwise: wanted and blank as `base`, asked by the atlas (0 where base is blank).
+  /// The same picture, asked for otherwise: wanted and blank as `base`, asked by the atlas (0 where base is
+  /// blank).
   ToneField(const ToneField& base, AskedAtlas atlas);
 
   double wanted(const SurfacePoint& point) const;  ///< 0..1

@@ -15,8 +15,8 @@ using Index = std::int64_t;
 /// Farther from the picture's own texels columns are not counted one by one.
 constexpr double kFar = 1e9;
 
-/// The column (or row) that holds `x`, when walking in direction `step`. Without repeats all before texel 0 is column
-/// -1, and all after the last texel is the last column: the tone does not change there.
+/// The column (or row) that holds `x`, when walking in direction `step`. Without repeats all before texel 0
+/// is column -1, and all after the last texel is the last column: the tone does not change there.
 inline Index column_of(double x, double step, int size, bool repeats) {
   if (!repeats) x = std::clamp(x, -.5, size - .5);
   const Index column = floor_index(x);
@@ -25,8 +25,8 @@ inline Index column_of(double x, double step, int size, bool repeats) {
   return repeats ? walked : std::clamp<Index>(walked, -1, size - 1);
 }
 
-/// Dunavant's rule of degree 4 on a triangle: two orbits of three places each, by the barycentric coordinate that
-/// differs, the other one, and the weight.
+/// Dunavant's rule of degree 4 on a triangle: two orbits of three places each, by the barycentric coordinate
+/// that differs, the other one, and the weight.
 struct Orbit {
   double alone, twice, weight;
 };
@@ -40,7 +40,8 @@ class ToneLayer::WindowCells {
  public:
   static constexpr Index kMaxCells = 36;
 
-  WindowCells(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0, Index columns, Index rows)
+  WindowCells(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0, Index columns,
+              Index rows)
       : columns_(columns), rows_(rows) {
     std::array<Index, kMaxCells + 1> texels;
     for (Index i = 0; i <= columns; ++i)
@@ -106,9 +107,9 @@ class ToneLayer::WindowCells {
   std::array<BoundaryCell, kMaxCells> cells_;
 };
 
-/// The cells along the way through a large polygon. Between rows j and j + 1 the tone is (1 - t) f(x) + t g(x), t = y -
-/// j, where f and g are piecewise linear; their integrals along x, from a fixed column x0, are kept while the walk
-/// crosses columns.
+/// The cells along the way through a large polygon. Between rows j and j + 1 the tone is (1 - t) f(x) + t
+/// g(x), t = y - j, where f and g are piecewise linear; their integrals along x, from a fixed column x0, are
+/// kept while the walk crosses columns.
 class ToneLayer::WalkedCells {
  public:
   WalkedCells(const ToneLayer& layer, TexelAddressing addressing, Index x0, Index y0)
@@ -118,7 +119,8 @@ class ToneLayer::WalkedCells {
     return hilbrush::column_of(x + static_cast<double>(x0_), step, layer_.width_, addressing_.repeat_x) - x0_;
   }
   Index row_of(double y, double step) const {
-    return hilbrush::column_of(y + static_cast<double>(y0_), step, layer_.height_, addressing_.repeat_y) - y0_;
+    return hilbrush::column_of(y + static_cast<double>(y0_), step, layer_.height_, addressing_.repeat_y) -
+           y0_;
   }
   void enter(Index column, Index row) {
     column_ = column + x0_;
@@ -146,7 +148,8 @@ class ToneLayer::WalkedCells {
   const BoundaryCell& here() {
     BoundaryCell& cell = cells_[next_];
     next_ = next_ + 1 == cells_.size() ? 0 : next_ + 1;
-    // Left of texel 0 of a picture that does not repeat the column has no left end; the integrals start at x0 = 0.
+    // Left of texel 0 of a picture that does not repeat the column has no left end; the integrals start at x0
+    // = 0.
     cell = {static_cast<double>(std::max(column_, x0_) - x0_), static_cast<double>(row_ - y0_), here_, sums_};
     return cell;
   }
@@ -261,7 +264,8 @@ void ToneLayer::add_column(RowPrefix& sum, int row, int column) const {
   const std::size_t upper = row + 1 == height_ ? 0 : lower + static_cast<std::size_t>(width_);
   const auto left = static_cast<std::size_t>(column),
              right = static_cast<std::size_t>(column + 1 == width_ ? 0 : column + 1);
-  const double a = tones_[lower + left], b = tones_[lower + right], c = tones_[upper + left], d = tones_[upper + right];
+  const double a = tones_[lower + left], b = tones_[lower + right], c = tones_[upper + left],
+               d = tones_[upper + right];
   const double f = .5 * (a + b);
   sum.f += f;
   sum.xf += column * f + a / 6 + b / 3;
@@ -271,8 +275,8 @@ void ToneLayer::add_column(RowPrefix& sum, int row, int column) const {
 
 ToneLayer::RowPrefix ToneLayer::prefix(int row, int column) const {
   const int block = column / kBlock;
-  RowPrefix sum =
-      prefixes_[static_cast<std::size_t>(row) * static_cast<std::size_t>(blocks_) + static_cast<std::size_t>(block)];
+  RowPrefix sum = prefixes_[static_cast<std::size_t>(row) * static_cast<std::size_t>(blocks_) +
+                            static_cast<std::size_t>(block)];
   for (int i = block * kBlock; i < column; ++i) add_column(sum, row, i);
   return sum;
 }
@@ -291,14 +295,16 @@ ToneLayer::RowPrefix ToneLayer::repeated_prefix(int row, std::int64_t column) co
 }
 
 double ToneLayer::at(const Eigen::Vector2d& point, TexelAddressing addressing) const {
-  const auto between = [](double s, double t, const float* lower, const float* upper, Index left, Index right) {
-    return (1 - t) * ((1 - s) * lower[left] + s * lower[right]) + t * ((1 - s) * upper[left] + s * upper[right]);
+  const auto between = [](double s, double t, const float* lower, const float* upper, Index left,
+                          Index right) {
+    return (1 - t) * ((1 - s) * lower[left] + s * lower[right]) +
+           t * ((1 - s) * upper[left] + s * upper[right]);
   };
   if (point.x() >= 0 && point.y() >= 0 && point.x() < width_ - 1 && point.y() < height_ - 1) {
     const auto column = static_cast<Index>(point.x()), row = static_cast<Index>(point.y());
     const float* lower = tones_.data() + row * width_;
-    return between(point.x() - static_cast<double>(column), point.y() - static_cast<double>(row), lower, lower + width_,
-                   column, column + 1);
+    return between(point.x() - static_cast<double>(column), point.y() - static_cast<double>(row), lower,
+                   lower + width_, column, column + 1);
   }
   const Index column = column_of(point.x(), 0, width_, addressing.repeat_x);
   const Index row = column_of(point.y(), 0, height_, addressing.repeat_y);
@@ -308,7 +314,8 @@ double ToneLayer::at(const Eigen::Vector2d& point, TexelAddressing addressing) c
                  texel_index(column + 1, width_, addressing.repeat_x));
 }
 
-TexelIntegral ToneLayer::integrate(std::span<const Eigen::Vector2d> polygon, TexelAddressing addressing) const {
+TexelIntegral ToneLayer::integrate(std::span<const Eigen::Vector2d> polygon,
+                                   TexelAddressing addressing) const {
   if (polygon.size() < 3) return {};
   Eigen::Vector2d low = polygon[0], high = low;
   for (const Eigen::Vector2d& p : polygon.subspan(1)) {

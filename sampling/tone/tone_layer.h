@@ -7,8 +7,9 @@
 #include "sampling/tone/texel_addressing.h"
 #include "sampling/tone/texel_integral.h"
 
-/// A tone picture that can be looked up at a point and integrated exactly over a polygon, both with the same bilinear
-/// interpolation and the same addressing. Coordinates are texels: texel (i, j) has its center at (i, j).
+/// A tone picture that can be looked up at a point and integrated exactly over a polygon, both with the same
+/// bilinear interpolation and the same addressing. Coordinates are texels: texel (i, j) has its center at (i,
+/// j).
 namespace hilbrush {
 
 class ToneLayer {
@@ -22,8 +23,9 @@ class ToneLayer {
 
   double at(const Eigen::Vector2d& point, TexelAddressing addressing) const;
 
-  /// Exact but for rounding, by Green's theorem: the boundary is cut at every row and column of texels, and on each
-  /// piece the sum of the row so far is a polynomial. Cost O(texels on the boundary), each row's sum from its blocks.
+  /// Exact but for rounding, by Green's theorem: the boundary is cut at every row and column of texels, and
+  /// on each piece the sum of the row so far is a polynomial. Cost O(texels on the boundary), each row's sum
+  /// from its blocks.
   TexelIntegral integrate(std::span<const Eigen::Vector2d> polygon, TexelAddressing addressing) const;
 
  private:
@@ -34,8 +36,8 @@ class ToneLayer {
                                          const Eigen::Vector2d& origin);
   const float* row(std::int64_t row, TexelAddressing addressing) const;
 
-  /// Integrals along a row from texel 0, of the tone, of x times it, of its square, and of its product with the row
-  /// above.
+  /// Integrals along a row from texel 0, of the tone, of x times it, of its square, and of its product with
+  /// the row above.
   struct RowPrefix {
     double f = 0, xf = 0, ff = 0, fg = 0;
   };

@@ -7,14 +7,15 @@
 
 #include "sampling/tone/triangle_tone.h"
 
-/// Small parts of ToneField: bilinear look-up of a computed texel, and integrals of a linear tone over a convex
-/// polygon.
+/// Small parts of ToneField: bilinear look-up of a computed texel, and integrals of a linear tone over a
+/// convex polygon.
 namespace hilbrush {
 
 /// No piece of a triangle that sampling makes has more corners.
 inline constexpr std::size_t kMaxPolygonCorners = 24;
 
-/// Bilinear look-up of texel_value(index) in a picture of which only the four texels around the point are computed.
+/// Bilinear look-up of texel_value(index) in a picture of which only the four texels around the point are
+/// computed.
 template <class TexelValue>
 double look_up(int width, int height, const Eigen::Vector2d& point, TexelAddressing addressing,
                TexelValue texel_value) {
@@ -28,14 +29,14 @@ double look_up(int width, int height, const Eigen::Vector2d& point, TexelAddress
       const double weight = (dx ? s : 1 - s) * (dy ? t : 1 - t);
       if (weight == 0) continue;
       const std::int64_t row = texel_index(y + dy, height, addressing.repeat_y);
-      sum +=
-          weight * texel_value(static_cast<std::size_t>(row * width + texel_index(x + dx, width, addressing.repeat_x)));
+      sum += weight * texel_value(static_cast<std::size_t>(row * width +
+                                                           texel_index(x + dx, width, addressing.repeat_x)));
     }
   return sum;
 }
 
-/// Integrals over a convex polygon of a tone that is linear on it; `scale` is the area of one unit square of the
-/// polygon's plane.
+/// Integrals over a convex polygon of a tone that is linear on it; `scale` is the area of one unit square of
+/// the polygon's plane.
 template <class Tone>
 ToneIntegral integrate_linear(std::span<const Eigen::Vector2d> polygon, Tone tone, double scale) {
   ToneIntegral sum;
@@ -77,10 +78,11 @@ inline ToneIntegral integrate_constant(std::span<const Eigen::Vector2d> polygon,
   return sum;
 }
 
-/// Cuts a convex polygon along the lines where the linear function `value` takes the given levels, and hands on each
-/// part.
+/// Cuts a convex polygon along the lines where the linear function `value` takes the given levels, and hands
+/// on each part.
 template <class Value, class Visit>
-void split_at_levels(std::span<const Eigen::Vector2d> polygon, Value value, std::vector<double> levels, Visit visit) {
+void split_at_levels(std::span<const Eigen::Vector2d> polygon, Value value, std::vector<double> levels,
+                     Visit visit) {
   std::sort(levels.begin(), levels.end());
   std::vector<Eigen::Vector2d> rest(polygon.begin(), polygon.end()), below, above;
   for (const double level : levels) {

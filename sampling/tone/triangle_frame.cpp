@@ -10,7 +10,8 @@ using Eigen::Vector3d;
 TriangleFrame::TriangleFrame(const TexturedMesh& mesh, std::uint32_t triangle) : triangle_(triangle) {
   double longest = -1;
   for (int c = 0; c < 3; ++c) {
-    const double squared = (mesh.corner(triangle, (c + 1) % 3) - mesh.corner(triangle, (c + 2) % 3)).squaredNorm();
+    const double squared =
+        (mesh.corner(triangle, (c + 1) % 3) - mesh.corner(triangle, (c + 2) % 3)).squaredNorm();
     if (squared > longest) longest = squared, apex_ = c;
   }
   const Vector3d& origin = mesh.corner(triangle, (apex_ + 1) % 3);
@@ -30,7 +31,8 @@ std::array<Vector2d, 3> TriangleFrame::corners() const {
 }
 
 Vector2d TriangleFrame::place(const Vector3d& barycentric) const {
-  return {barycentric[apex_] * foot_m_ + barycentric[(apex_ + 2) % 3] * length_m_, barycentric[apex_] * height_m_};
+  return {barycentric[apex_] * foot_m_ + barycentric[(apex_ + 2) % 3] * length_m_,
+          barycentric[apex_] * height_m_};
 }
 
 Vector3d TriangleFrame::barycentric(const Vector2d& place) const {

@@ -8,7 +8,8 @@
 /// A triangle in its own plane: x runs along its longest edge, y from there to the apex; meters.
 namespace hilbrush {
 
-/// What a box cuts out of a triangle, by second and third barycentric coordinates; no corners if they don't meet.
+/// What a box cuts out of a triangle, by second and third barycentric coordinates; no corners if they don't
+/// meet.
 struct BoxedPolygon {
   std::array<Eigen::Vector2d, 8> b;  ///< a triangle cut by four sides has seven corners
   std::size_t count = 0;

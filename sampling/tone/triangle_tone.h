@@ -18,8 +18,8 @@ struct ToneIntegral {
   double square = 0;  ///< asked coverage squared, for the deviation of equations 7.3 and 7.4
 };
 
-/// The asked tone on one triangle, made ready for many look-ups and integrals: where it comes from, and the triangle in
-/// texels. Refers to the ToneField that made it.
+/// The asked tone on one triangle, made ready for many look-ups and integrals: where it comes from, and the
+/// triangle in texels. Refers to the ToneField that made it.
 class TriangleTone {
  public:
   TriangleTone() = default;
@@ -31,8 +31,8 @@ class TriangleTone {
   /// What is asked for is what is wanted, everywhere.
   bool is_wanted_asked() const { return is_wanted_asked_; }
 
-  /// Exact (but for rounding) over a convex polygon; its corners by second and third barycentric coordinate, in either
-  /// sense of rotation. Thread-safe.
+  /// Exact (but for rounding) over a convex polygon; its corners by second and third barycentric coordinate,
+  /// in either sense of rotation. Thread-safe.
   ToneIntegral integrate(std::span<const Eigen::Vector2d> polygon) const;
 
   /// m^2 for a unit of barycentric area: twice the triangle's area.

@@ -27,8 +27,8 @@ AxisMotion AxisMotion::move_to(double target, double start_s, double speed_max, 
   return move_to(target, start_s, start_s, speed_max, acceleration, acceleration);
 }
 
-AxisMotion AxisMotion::move_to(double target, double start_s, double go_s, double speed_max, double acceleration,
-                               double braking) const {
+AxisMotion AxisMotion::move_to(double target, double start_s, double go_s, double speed_max,
+                               double acceleration, double braking) const {
   AxisMotion motion = brake(start_s, braking);
   motion.append(go_s - motion.end_s_, 0, 0);
   const double distance = std::abs(target - motion.last_position_);
@@ -43,8 +43,8 @@ AxisMotion AxisMotion::move_to(double target, double start_s, double go_s, doubl
   return motion;
 }
 
-void move_coordinated(std::span<AxisMotion> motions, std::span<const double> target, std::span<const AxisLimits> limits,
-                      double start_s) {
+void move_coordinated(std::span<AxisMotion> motions, std::span<const double> target,
+                      std::span<const AxisLimits> limits, double start_s) {
   // The whole move is 1 long; of it every axis allows a speed and an acceleration.
   double speed_max = std::numeric_limits<double>::infinity();
   double acceleration = std::numeric_limits<double>::infinity();

@@ -4,19 +4,18 @@
 
 namespace hilbrush {
 
-/// One axis's position as a closed-form function of time: at rest, then at most five pieces of constant acceleration (a
-/// braking piece if it was still moving, a rest until others have braked, then speed up, cruise, slow down), then at
-/// rest again. Units of the axis: rad
-/// or m.
+/// One axis's position as a closed-form function of time: at rest, then at most five pieces of constant
+/// acceleration (a braking piece if it was still moving, a rest until others have braked, then speed up,
+/// cruise, slow down), then at rest again. Units of the axis: rad or m.
 class AxisMotion {
  public:
   explicit AxisMotion(double position = 0) : first_position_(position), last_position_(position) {}
 
-  /// The motion that leaves this one at `start_s` and comes to rest at `target`. An axis that is still moving brakes
-  /// first.
+  /// The motion that leaves this one at `start_s` and comes to rest at `target`. An axis that is still moving
+  /// brakes first.
   AxisMotion move_to(double target, double start_s, double speed_max, double acceleration) const;
-  /// The same, but it leaves its resting place at `go_s` at the earliest, with `speed_max` and `acceleration`; it
-  /// brakes with `braking`.
+  /// The same, but it leaves its resting place at `go_s` at the earliest, with `speed_max` and
+  /// `acceleration`; it brakes with `braking`.
   AxisMotion move_to(double target, double start_s, double go_s, double speed_max, double acceleration,
                      double braking) const;
   /// The motion that leaves this one at `start_s` and brakes until it rests.
@@ -47,9 +46,9 @@ class AxisMotion {
 struct AxisLimits {
   double speed_max, acceleration;
 };
-/// Leads all axes to `target` along a straight line, each within its limits: they start together, once all have braked,
-/// and arrive together.
-void move_coordinated(std::span<AxisMotion> motions, std::span<const double> target, std::span<const AxisLimits> limits,
-                      double start_s);
+/// Leads all axes to `target` along a straight line, each within its limits: they start together, once all
+/// have braked, and arrive together.
+void move_coordinated(std::span<AxisMotion> motions, std::span<const double> target,
+                      std::span<const AxisLimits> limits, double start_s);
 
 }  // namespace hilbrush

@@ -24,9 +24,11 @@ static_assert(std::endian::native == std::endian::little, "records are written a
 constexpr std::string_view kHeader =
     "hilbrush emissions 1\n"
     "format binary_little_endian\n"
-    "property double j1\nproperty double j2\nproperty double j3\nproperty double j4\nproperty double a\nproperty "
+    "property double j1\nproperty double j2\nproperty double j3\nproperty double j4\nproperty double "
+    "a\nproperty "
     "double c\n"
-    "property double start_s\nproperty double length_s\nproperty double commanded_s\nproperty double power_w\n"
+    "property double start_s\nproperty double length_s\nproperty double commanded_s\nproperty double "
+    "power_w\n"
     "property uint is_moving\n"
     "property uint crc32\n"
     "end_header\n";

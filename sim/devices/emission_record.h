@@ -7,8 +7,8 @@
 
 #include "planner/cell_model/cell_description.h"
 
-/// What the simulated laser really emitted, from where. Kept by the simulated devices, not by the controller: it is the
-/// witness.
+/// What the simulated laser really emitted, from where. Kept by the simulated devices, not by the controller:
+/// it is the witness.
 namespace hilbrush {
 
 struct Emission {
@@ -20,23 +20,24 @@ struct Emission {
   bool is_moving = false;  ///< some axis was moving or not settled at some time of the pulse: a safety fault
 };
 
-/// Called by the simulated laser once for each emission, when it has ended; from the thread that ends it, under the
-/// cell's lock (it must not call the cell). A pulse that ends by itself is handed over at the next call to the laser or
-/// move of an axis.
+/// Called by the simulated laser once for each emission, when it has ended; from the thread that ends it,
+/// under the cell's lock (it must not call the cell). A pulse that ends by itself is handed over at the next
+/// call to the laser or move of an axis.
 using EmissionSink = std::function<void(const Emission&)>;
 
-/// A growing file of emissions: a text header that describes the records as PLY would (without a count, which could not
-/// be kept right), then fixed-size little-endian records, each with a CRC-32 of its own bytes. Readable whatever
-/// instant the writer died. One thread.
+/// A growing file of emissions: a text header that describes the records as PLY would (without a count, which
+/// could not be kept right), then fixed-size little-endian records, each with a CRC-32 of its own bytes.
+/// Readable whatever instant the writer died. One thread.
 class EmissionRecordFile {
  public:
-  /// Opens for appending, creates if absent; a torn last record is cut off first. @throws std::runtime_error naming the
-  /// file.
+  /// Opens for appending, creates if absent; a torn last record is cut off first. @throws std::runtime_error
+  /// naming the file.
   explicit EmissionRecordFile(const std::filesystem::path& file);
   ~EmissionRecordFile();
   EmissionRecordFile(const EmissionRecordFile&) = delete;
   EmissionRecordFile& operator=(const EmissionRecordFile&) = delete;
-  /// One write to the system, so that a killed process loses nothing. @throws std::runtime_error naming the file.
+  /// One write to the system, so that a killed process loses nothing. @throws std::runtime_error naming the
+  /// file.
   void append(const Emission& emission);
 
  private:

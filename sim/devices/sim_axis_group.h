@@ -15,13 +15,14 @@
 
 namespace hilbrush {
 
-/// N simulated axes that start together, each on its own profile; the group arrives with the slowest, on a control
-/// tick. The encoders are absolute: home() makes the group ready without moving, and it begins its life at the axes'
-/// home positions.
+/// N simulated axes that start together, each on its own profile; the group arrives with the slowest, on a
+/// control tick. The encoders are absolute: home() makes the group ready without moving, and it begins its
+/// life at the axes' home positions.
 ///
-/// Two truths about rest are kept apart: `in_position` of the status is what the controller reports, after the settle
-/// time that move_to() was given; is_settled() is what the mechanics did, by the cell's own settle times. They differ
-/// if the settle time asked for was too short: a pulse is then recorded as fired while the axes moved.
+/// Two truths about rest are kept apart: `in_position` of the status is what the controller reports, after
+/// the settle time that move_to() was given; is_settled() is what the mechanics did, by the cell's own settle
+/// times. They differ if the settle time asked for was too short: a pulse is then recorded as fired while the
+/// axes moved.
 template <std::size_t N>
 class SimAxisGroup final : public AxisGroup<N> {
  public:
@@ -74,7 +75,8 @@ class SimAxisGroup final : public AxisGroup<N> {
     double share = 0;
     for (std::size_t i = 0; i < N; ++i) {
       const double move = std::abs(target[i] - motions_[i].position(now));
-      if (axes_[i].settle_saturation > 0) share = std::max(share, std::min(1., move / axes_[i].settle_saturation));
+      if (axes_[i].settle_saturation > 0)
+        share = std::max(share, std::min(1., move / axes_[i].settle_saturation));
       motions_[i] = motions_[i].move_to(target[i], now, axes_[i].speed_max, axes_[i].acceleration_max);
       end = std::max(end, motions_[i].end_s());
     }

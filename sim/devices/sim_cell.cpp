@@ -7,14 +7,16 @@
 
 namespace hilbrush {
 
-/// One mutex for the whole cell: what the laser records about the axes is then one instant's truth, and no lock order
-/// can go wrong.
+/// One mutex for the whole cell: what the laser records about the axes is then one instant's truth, and no
+/// lock order can go wrong.
 struct SimCell::Implementation {
   Implementation(const CellDescription& description, const SimCellOptions& options)
       : clock(description.simulation.time_scale),
-        laser(description, options.laser_start_delay_s, mutex, clock, [this](double now_s) { return axes_at(now_s); }),
+        laser(description, options.laser_start_delay_s, mutex, clock,
+              [this](double now_s) { return axes_at(now_s); }),
         robot("robot", description, kJ1, mutex, clock, [this](double now_s) { laser.note_motion(now_s); }),
-        table("table", description, kTilt, mutex, clock, [this](double now_s) { laser.note_motion(now_s); }) {}
+        table("table", description, kTilt, mutex, clock, [this](double now_s) { laser.note_motion(now_s); }) {
+  }
 
   SimLaser::AxesState axes_at(double now_s) const {
     SimLaser::AxesState axes;

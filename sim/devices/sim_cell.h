@@ -6,10 +6,10 @@
 #include "planner/cell_model/cell_description.h"
 #include "sim/devices/emission_record.h"
 
-/// The simulated cell in process: robot, table and laser behind the drivers' interfaces, on a clock that runs at the
-/// cell file's time_scale (0: virtual time that jumps to whatever is slept for). Axes follow trapezoidal profiles and
-/// settle; positions are true functions of time. Thread-safe as the interfaces say. It starts disconnected, at the
-/// axes' home positions, interlock closed, laser off.
+/// The simulated cell in process: robot, table and laser behind the drivers' interfaces, on a clock that runs
+/// at the cell file's time_scale (0: virtual time that jumps to whatever is slept for). Axes follow
+/// trapezoidal profiles and settle; positions are true functions of time. Thread-safe as the interfaces say.
+/// It starts disconnected, at the axes' home positions, interlock closed, laser off.
 namespace hilbrush {
 
 struct SimCellOptions {
@@ -27,10 +27,11 @@ class SimCell {
   void set_emission_sink(EmissionSink sink);
   /// True joint values now.
   Joints joints() const;
-  /// Opens or closes the interlock; opening cuts a running pulse and leaves an enabled laser in fault. From any thread.
+  /// Opens or closes the interlock; opening cuts a running pulse and leaves an enabled laser in fault. From
+  /// any thread.
   void set_interlock_closed(bool closed);
-  /// Breaks a device, as a scripted fault: it brakes and reports the sentence until its fault is cleared. From any
-  /// thread.
+  /// Breaks a device, as a scripted fault: it brakes and reports the sentence until its fault is cleared.
+  /// From any thread.
   void fail_robot(const std::string& fault);
   void fail_table(const std::string& fault);
 

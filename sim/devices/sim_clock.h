@@ -5,9 +5,9 @@
 
 namespace hilbrush {
 
-/// The simulated cell's time. time_scale wall seconds make one cell second; 0 is virtual time, which stands still until
-/// a thread sleeps and then jumps to the end of the sleep: right for one executor thread, whose sleeps are then all
-/// that takes time.
+/// The simulated cell's time. time_scale wall seconds make one cell second; 0 is virtual time, which stands
+/// still until a thread sleeps and then jumps to the end of the sleep: right for one executor thread, whose
+/// sleeps are then all that takes time.
 class SimClock final : public Clock {
  public:
   explicit SimClock(double time_scale) : time_scale_(time_scale) {}

@@ -48,7 +48,8 @@ void SimLaser::enable() {
   state_ = DeviceState::kEnabled;
   const auto wall_delay = std::chrono::duration<double>(clock_.wall_s(start_delay_s_));
   state_changed_.wait_for(lock, wall_delay, [this] { return state_ != DeviceState::kEnabled; });
-  if (state_ != DeviceState::kEnabled) throw DriverError("the laser was turned off again during its start delay");
+  if (state_ != DeviceState::kEnabled)
+    throw DriverError("the laser was turned off again during its start delay");
   clock_.jump_to(clock_.now_s() + start_delay_s_);
   state_ = DeviceState::kReady;
 }
@@ -70,7 +71,8 @@ void SimLaser::fire(double power_w, double pulse_s) {
   if (!is_within(power_w, limits_.power_min_w, limits_.power_max_w) ||
       !is_within(pulse_s, limits_.pulse_min_s, limits_.pulse_max_s)) {
     const std::string text = fmt::format(
-        "the laser refuses a pulse of {:.4g} W and {:.4g} ms: its limits are {:.4g} to {:.4g} W and {:.4g} to {:.4g} "
+        "the laser refuses a pulse of {:.4g} W and {:.4g} ms: its limits are {:.4g} to {:.4g} W and {:.4g} "
+        "to {:.4g} "
         "ms",
         power_w, pulse_s * 1e3, limits_.power_min_w, limits_.power_max_w, limits_.pulse_min_s * 1e3,
         limits_.pulse_max_s * 1e3);
@@ -151,7 +153,8 @@ void SimLaser::record_ended(double now_s) noexcept {
   if (!pulse_ || now_s < pulse_->end_s) return;
   Emission emission = pulse_->emission;
   // What was not cut is exactly what was commanded; the difference of two times would add their rounding.
-  if (pulse_->end_s < emission.start_s + emission.commanded_s) emission.length_s = pulse_->end_s - emission.start_s;
+  if (pulse_->end_s < emission.start_s + emission.commanded_s)
+    emission.length_s = pulse_->end_s - emission.start_s;
   pulse_.reset();
   if (!sink_) return;
   try {

@@ -12,10 +12,10 @@
 
 namespace hilbrush {
 
-/// The simulated laser. It times each pulse itself: the pulse's end is fixed when it starts, and only off(), disable(),
-/// the interlock or a fault can bring it forward. off() closes the gate on the next control tick and waits for it; the
-/// interlock cuts at once. It knows nothing of the axes and fires whenever it is ordered to; the emission record says what
-/// it did while they moved.
+/// The simulated laser. It times each pulse itself: the pulse's end is fixed when it starts, and only off(),
+/// disable(), the interlock or a fault can bring it forward. off() closes the gate on the next control tick
+/// and waits for it; the interlock cuts at once. It knows nothing of the axes and fires whenever it is
+/// ordered to; the emission record says what it did while they moved.
 class SimLaser final : public Laser {
  public:
   /// What the axes truly are, asked under the lock when a pulse begins.
@@ -25,7 +25,8 @@ class SimLaser final : public Laser {
   };
   using AxesProbe = std::function<AxesState(double now_s)>;
 
-  SimLaser(const CellDescription& cell, double start_delay_s, std::mutex& mutex, SimClock& clock, AxesProbe probe);
+  SimLaser(const CellDescription& cell, double start_delay_s, std::mutex& mutex, SimClock& clock,
+           AxesProbe probe);
   ~SimLaser() override;
 
   void connect() override;
@@ -39,8 +40,8 @@ class SimLaser final : public Laser {
 
   void set_sink(EmissionSink sink);
   void set_interlock_closed(bool closed);
-  /// Axes begin to move at now_s: a pulse that is still on is marked, one that has ended is recorded. The caller holds
-  /// the cell's mutex.
+  /// Axes begin to move at now_s: a pulse that is still on is marked, one that has ended is recorded. The
+  /// caller holds the cell's mutex.
   void note_motion(double now_s) noexcept;
 
  private:

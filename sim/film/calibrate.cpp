@@ -13,14 +13,14 @@ namespace hilbrush {
 
 namespace {
 
-/// Sides of a field in pitches: neither square nor powers of two, where dots along a Hilbert curve fall into exact
-/// grids that no object shows.
+/// Sides of a field in pitches: neither square nor powers of two, where dots along a Hilbert curve fall into
+/// exact grids that no object shows.
 constexpr double kFieldWidth = 137, kFieldHeight = 91;
 /// What is not read along the border, in pitches: light is lost over the edge.
 constexpr double kFieldBorder = 4;
 
-/// A flat black field, upright (laminar slices paint nothing that lies), whose tone curve then asks for whatever
-/// coverage a step needs.
+/// A flat black field, upright (laminar slices paint nothing that lies), whose tone curve then asks for
+/// whatever coverage a step needs.
 TexturedMesh black_field(double width_m, double height_m) {
   TexturedMesh field;
   field.vertices = {{0, 0, 0}, {width_m, 0, 0}, {width_m, 0, height_m}, {0, 0, height_m}};
@@ -48,8 +48,8 @@ double read_field(const Film& film, double width_m, double height_m) {
   return sum / static_cast<double>(count);
 }
 
-double paint_step(const CellDescription& cell, double pitch_m, PictureOptions options, const TexturedMesh& field,
-                  const SurfaceCurve& curve, double asked) {
+double paint_step(const CellDescription& cell, double pitch_m, PictureOptions options,
+                  const TexturedMesh& field, const SurfaceCurve& curve, double asked) {
   ToneOptions tone_options;
   tone_options.untextured = Untextured::kMaterial;
   tone_options.curve = {{0, 1}, {0, asked}};
@@ -63,10 +63,11 @@ double paint_step(const CellDescription& cell, double pitch_m, PictureOptions op
   return read_field(film, kFieldWidth * pitch_m, kFieldHeight * pitch_m);
 }
 
-/// Readings in rising order of what was asked; a reading that falls (by the grain of the dots) takes the mean with its
-/// neighbors.
+/// Readings in rising order of what was asked; a reading that falls (by the grain of the dots) takes the mean
+/// with its neighbors.
 std::vector<WedgeStep> monotone(std::vector<WedgeStep> steps) {
-  std::sort(steps.begin(), steps.end(), [](const WedgeStep& a, const WedgeStep& b) { return a.asked < b.asked; });
+  std::sort(steps.begin(), steps.end(),
+            [](const WedgeStep& a, const WedgeStep& b) { return a.asked < b.asked; });
   // Pool adjacent violators: blocks of equal mean until the means rise.
   struct Block {
     double sum = 0;
@@ -104,26 +105,31 @@ double asked_for(const std::vector<WedgeStep>& steps, double wanted, double aske
 Wedge wedge_on_film(const CellDescription& cell, double pitch_m, const PictureOptions& options) {
   return [&cell, pitch_m, options](const std::vector<double>& asked) {
     const TexturedMesh field = black_field(kFieldWidth * pitch_m, kFieldHeight * pitch_m);
-    const SurfaceCurve curve(field, options.curve == CurveKind::kLaminar ? CurveKind::kHilbert : options.curve);
+    const SurfaceCurve curve(field,
+                             options.curve == CurveKind::kLaminar ? CurveKind::kHilbert : options.curve);
     std::vector<WedgeStep> steps;
     for (const double coverage : asked)
-      steps.push_back({coverage, coverage > 0 ? paint_step(cell, pitch_m, options, field, curve, coverage) : 0.});
+      steps.push_back(
+          {coverage, coverage > 0 ? paint_step(cell, pitch_m, options, field, curve, coverage) : 0.});
     return steps;
   };
 }
 
-std::vector<double> wedge_steps(std::vector<double> shares, double asked_max, std::span<const double> levels) {
+std::vector<double> wedge_steps(std::vector<double> shares, double asked_max,
+                                std::span<const double> levels) {
   for (double& share : shares) share *= asked_max;
   for (std::size_t k = 0; k + 1 < levels.size(); ++k) {
     const double last = kEnoughDots * levels[k];
-    const auto nearest = std::min_element(shares.begin(), shares.end(),
-                                          [&](double a, double b) { return std::abs(a - last) < std::abs(b - last); });
+    const auto nearest = std::min_element(shares.begin(), shares.end(), [&](double a, double b) {
+      return std::abs(a - last) < std::abs(b - last);
+    });
     if (nearest != shares.end()) *nearest = last;
   }
   return shares;
 }
 
-ToneCurve tone_curve_of(const std::vector<WedgeStep>& steps, double asked_max, std::span<const double> levels) {
+ToneCurve tone_curve_of(const std::vector<WedgeStep>& steps, double asked_max,
+                        std::span<const double> levels) {
   constexpr std::size_t kStepsMin = 5;
   constexpr int kTones = 40;  // fine enough that the bends of the wedge's own steps are kept
   constexpr double kJump = 1e-4;
@@ -180,7 +186,8 @@ ToneCurve calibrate_tone(const Wedge& wedge, double asked_max) {
     if (round > 0 && worst <= kTolerance) break;
     readings.insert(readings.end(), steps.begin() + 1, steps.end());
     readings = monotone(readings);
-    if (!(readings.back().painted > 0)) throw InputError("", "the wedge reads no paint at all, whatever was asked");
+    if (!(readings.back().painted > 0))
+      throw InputError("", "the wedge reads no paint at all, whatever was asked");
     for (std::size_t i = 1; i < wanted.size(); ++i)
       asked[i] = std::max(asked[i - 1], asked_for(readings, wanted[i], asked_max));
   }

@@ -66,8 +66,8 @@ constexpr Glyph kGlyphs[] = {
 
 const Glyph* find_glyph(char character) {
   const auto upper = static_cast<char>(std::toupper(static_cast<unsigned char>(character)));
-  const auto* found =
-      std::find_if(std::begin(kGlyphs), std::end(kGlyphs), [&](const Glyph& g) { return g.character == upper; });
+  const auto* found = std::find_if(std::begin(kGlyphs), std::end(kGlyphs),
+                                   [&](const Glyph& g) { return g.character == upper; });
   return found == std::end(kGlyphs) ? nullptr : found;
 }
 
@@ -80,7 +80,8 @@ Canvas::Canvas(int width, int height, Color background)
 
 void Canvas::set(int x, int y, Color color) {
   if (x < 0 || y < 0 || x >= picture_.width || y >= picture_.height) return;
-  std::copy(color.begin(), color.end(), &picture_.pixels[(static_cast<std::size_t>(y) * picture_.width + x) * 3]);
+  std::copy(color.begin(), color.end(),
+            &picture_.pixels[(static_cast<std::size_t>(y) * picture_.width + x) * 3]);
 }
 
 void Canvas::mark(int x, int y, int radius, Color color) {

@@ -19,11 +19,13 @@ class Canvas {
   void mark(int x, int y, int radius, Color color);
   /// A straight line, one pixel wide, ends included.
   void line(int x0, int y0, int x1, int y1, Color color);
-  /// Capitals, digits and common signs in a 5 x 7 raster, enlarged `scale` times, top left corner at (x, y); anything
-  /// else is left blank.
+  /// Capitals, digits and common signs in a 5 x 7 raster, enlarged `scale` times, top left corner at (x, y);
+  /// anything else is left blank.
   void write(int x, int y, std::string_view text, int scale, Color color);
 
-  static int text_width(std::string_view text, int scale) { return static_cast<int>(text.size()) * 6 * scale; }
+  static int text_width(std::string_view text, int scale) {
+    return static_cast<int>(text.size()) * 6 * scale;
+  }
   static int text_height(int scale) { return 7 * scale; }
 
   const Picture& picture() const { return picture_; }

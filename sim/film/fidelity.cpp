@@ -43,8 +43,8 @@ std::vector<Reading> stratified_points(const TexturedMesh& mesh, std::uint64_t s
   std::vector<Reading> readings(area > 0 ? kSampleCount : 0);
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const double place = (static_cast<double>(i) + uniform(seed, 3 * i)) / kSampleCount * area;
-    const auto t = std::min<std::size_t>(std::upper_bound(area_to.begin(), area_to.end(), place) - area_to.begin(),
-                                         area_to.size() - 1);
+    const auto t = std::min<std::size_t>(
+        std::upper_bound(area_to.begin(), area_to.end(), place) - area_to.begin(), area_to.size() - 1);
     const double root = std::sqrt(uniform(seed, 3 * i + 1));
     const double v = uniform(seed, 3 * i + 2);
     readings[i].point = {static_cast<std::uint32_t>(t), {1 - root, root * (1 - v), root * v}};
@@ -89,11 +89,12 @@ FidelityFigures surface_figures(const std::vector<Reading>& readings, Counts cou
   return figures;
 }
 
-/// Reachability everywhere, from the readings: that of the nearest one of a similar normal. Most places have nothing
-/// unreachable near them, and are answered by one look.
+/// Reachability everywhere, from the readings: that of the nearest one of a similar normal. Most places have
+/// nothing unreachable near them, and are answered by one look.
 class ReachMap {
  public:
-  ReachMap(const TexturedMesh& mesh, const std::vector<Reading>& readings) : mesh_(mesh), readings_(readings) {
+  ReachMap(const TexturedMesh& mesh, const std::vector<Reading>& readings)
+      : mesh_(mesh), readings_(readings) {
     cell_m_ = 2 * std::sqrt(mesh.area_m2() / static_cast<double>(std::max<std::size_t>(readings.size(), 1)));
     for (std::uint32_t i = 0; i < readings.size(); ++i) {
       const Eigen::Vector3i cell = cell_of(position(mesh, readings[i].point));
@@ -125,7 +126,9 @@ class ReachMap {
 
  private:
   static Eigen::Vector3i neighbor(int k) { return {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}; }
-  Eigen::Vector3i cell_of(const Eigen::Vector3d& p_O) const { return (p_O / cell_m_).array().floor().cast<int>(); }
+  Eigen::Vector3i cell_of(const Eigen::Vector3d& p_O) const {
+    return (p_O / cell_m_).array().floor().cast<int>();
+  }
   static std::uint64_t key(const Eigen::Vector3i& cell) {
     std::uint64_t key = 0;
     for (int k = 0; k < 3; ++k) key = key << 21 | (static_cast<std::uint32_t>(cell[k]) & 0x1fffffu);
@@ -139,15 +142,17 @@ class ReachMap {
   std::unordered_set<std::uint64_t> doubtful_;  ///< cells with an unreachable reading in or beside them
 };
 
-/// The six directions of S2: along the axes, turned so that nothing drawn parallel to them falls in line with the
-/// pixels.
+/// The six directions of S2: along the axes, turned so that nothing drawn parallel to them falls in line with
+/// the pixels.
 std::array<ViewDirection, 6> measuring_views() {
   const Eigen::Matrix3d turn =
-      (Eigen::AngleAxisd(.35, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(.21, Eigen::Vector3d::UnitX())).matrix();
+      (Eigen::AngleAxisd(.35, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(.21, Eigen::Vector3d::UnitX()))
+          .matrix();
   std::array<ViewDirection, 6> views;
   for (int k = 0; k < 6; ++k) {
     const double sign = k % 2 == 0 ? 1 : -1;
-    views[k] = {"", turn * sign * Eigen::Vector3d::Unit(k / 2), turn * Eigen::Vector3d::Unit((k / 2 + 1) % 3)};
+    views[k] = {"", turn * sign * Eigen::Vector3d::Unit(k / 2),
+                turn * Eigen::Vector3d::Unit((k / 2 + 1) % 3)};
   }
   return views;
 }
@@ -178,11 +183,12 @@ MaskedImage ssim(const MaskedImage& picture) {
   return similarity;
 }
 
-/// S2 of the views added so far. What is reachable is decided for the pixels that are scored; the blur before sees all
-/// film, so that the border of an unreachable place counts against the picture.
+/// S2 of the views added so far. What is reachable is decided for the pixels that are scored; the blur before
+/// sees all film, so that the border of an unreachable place counts against the picture.
 class ViewSimilarity {
  public:
-  void add(const MaskedImage& picture, const OrthographicView& view, double pixels_a_pitch, const ReachMap& reach) {
+  void add(const MaskedImage& picture, const OrthographicView& view, double pixels_a_pitch,
+           const ReachMap& reach) {
     const int step = std::max(1, static_cast<int>(std::lround(pixels_a_pitch)));
     const MaskedImage similarity = ssim(masked_blur(picture, 2 * pixels_a_pitch, step));
     for (int y = 0; y < similarity.height; ++y)
@@ -235,8 +241,8 @@ double measuring_pixel_m(const Film& film) {
 
 }  // namespace
 
-Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTest& is_reachable, std::uint64_t seed,
-                          const Progress& progress) {
+Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTest& is_reachable,
+                          std::uint64_t seed, const Progress& progress) {
   std::vector<Reading> readings = stratified_points(film.mesh(), seed);
   constexpr std::size_t kBatch = 2000;
   for_batches(readings.size(), kBatch, progress.part(0, .5), [&](std::size_t begin, std::size_t end) {
@@ -253,8 +259,8 @@ Fidelity measure_fidelity(const Film& film, const ToneField& tone, const ReachTe
   Fidelity fidelity;
   fidelity.whole = surface_figures(readings, [](const Reading&) { return true; });
   fidelity.reachable = surface_figures(readings, [](const Reading& reading) { return reading.is_reachable; });
-  const auto unreachable =
-      std::count_if(readings.begin(), readings.end(), [](const Reading& reading) { return !reading.is_reachable; });
+  const auto unreachable = std::count_if(readings.begin(), readings.end(),
+                                         [](const Reading& reading) { return !reading.is_reachable; });
   fidelity.unreachable_share =
       readings.empty() ? 0 : static_cast<double>(unreachable) / static_cast<double>(readings.size());
 

@@ -15,8 +15,8 @@ namespace hilbrush {
 
 namespace {
 
-/// Emissions between two reports of progress; fixed, so that sums come in the same order whatever the number of
-/// threads.
+/// Emissions between two reports of progress; fixed, so that sums come in the same order whatever the number
+/// of threads.
 constexpr std::size_t kBatch = 1 << 16;
 constexpr std::size_t kChunk = 1 << 10;
 /// m: a beam that lands this far before its focus was blocked by something.
@@ -30,8 +30,9 @@ Touch touch(std::uint32_t tile, std::size_t spot) {
 
 }  // namespace
 
-/// The paint's response at fixed steps up to a few full doses, for pictures and measurements that ask millions of
-/// times. Between steps linear: wrong by less than 2e-6. The kink of the linear response lies on a step.
+/// The paint's response at fixed steps up to a few full doses, for pictures and measurements that ask
+/// millions of times. Between steps linear: wrong by less than 2e-6. The kink of the linear response lies on
+/// a step.
 class ResponseTable {
  public:
   explicit ResponseTable(PaintResponse response) : response_(response) {
@@ -122,7 +123,8 @@ void Film::Implementation::expose(std::span<const Spot> spots) {
   tile_begins.push_back(all.size());
   tbb::parallel_for(std::size_t{0}, tile_begins.size() - 1, [&](std::size_t k) {
     std::vector<const Spot*> on_tile;
-    for (std::size_t j = tile_begins[k]; j < tile_begins[k + 1]; ++j) on_tile.push_back(&spots[all[j] & 0xffffffffu]);
+    for (std::size_t j = tile_begins[k]; j < tile_begins[k + 1]; ++j)
+      on_tile.push_back(&spots[all[j] & 0xffffffffu]);
     lattice.expose(static_cast<std::uint32_t>(all[tile_begins[k]] >> 32), on_tile);
   });
 }
@@ -137,8 +139,8 @@ std::vector<Hit> Film::expose(std::span<const Emission> emissions, const Progres
   std::vector<Spot> spots;
   for_batches(emissions.size(), kBatch, progress, [&](std::size_t begin, std::size_t end) {
     spots.resize(end - begin);
-    tbb::parallel_for(begin, end,
-                      [&](std::size_t i) { hits[i] = implementation_->land(emissions[i], spots[i - begin]); });
+    tbb::parallel_for(
+        begin, end, [&](std::size_t i) { hits[i] = implementation_->land(emissions[i], spots[i - begin]); });
     implementation_->expose(spots);
   });
   return hits;
@@ -167,7 +169,8 @@ double Film::dose_j_m2(const SurfacePoint& point) const {
 double Film::painted(const SurfacePoint& point) const {
   const FilmLattice::Neighbors around = implementation_->lattice.neighbors(point);
   double coverage = 0;
-  for (std::size_t k = 0; k < around.weights.size(); ++k) coverage += around.weights[k] * painted(around.doses_j_m2[k]);
+  for (std::size_t k = 0; k < around.weights.size(); ++k)
+    coverage += around.weights[k] * painted(around.doses_j_m2[k]);
   return coverage;
 }
 

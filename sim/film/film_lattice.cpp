@@ -14,10 +14,11 @@ namespace hilbrush {
 
 namespace {
 
-/// Beyond this much of the beam's direction along the face there is no dose: grazing light, and faces turned away.
+/// Beyond this much of the beam's direction along the face there is no dose: grazing light, and faces turned
+/// away.
 constexpr double kGrazingCosine = .02;
-/// Light is followed this many cut radii before and behind the point that it hit: enough for incidences up to 63
-/// degrees.
+/// Light is followed this many cut radii before and behind the point that it hit: enough for incidences up to
+/// 63 degrees.
 constexpr double kDepthWindow = 2;
 
 std::uint32_t steps_over(double length_m, double spacing_m) {
@@ -39,8 +40,8 @@ int corner_opposite_longest_edge(const TexturedMesh& mesh, std::size_t t) {
 
 }  // namespace
 
-/// A grid in the coordinates of an axis: two across it, from the axis, and the depth along it. The place at s meters
-/// along the longest edge and y meters above it is start + s along + y up.
+/// A grid in the coordinates of an axis: two across it, from the axis, and the depth along it. The place at s
+/// meters along the longest edge and y meters above it is start + s along + y up.
 struct FilmLattice::Frame {
   Eigen::Vector2d start, along, up;
   double start_depth, along_depth, up_depth;
@@ -50,8 +51,8 @@ struct FilmLattice::Frame {
   double row_step() const { return static_cast<double>(grid.height_m) / grid.rows; }
   double column_step() const { return static_cast<double>(grid.length_m) / grid.columns; }
 
-  /// Of `count` lines parallel to the rows, the first y0 above the longest edge and the others one row step apart,
-  /// those that pass the axis within the radius and between the ends of the longest edge.
+  /// Of `count` lines parallel to the rows, the first y0 above the longest edge and the others one row step
+  /// apart, those that pass the axis within the radius and between the ends of the longest edge.
   RowRange lines_near(double y0, std::uint32_t count) const {
     const double stretch = along.norm();  // > 0 unless the axis runs along the rows: then nothing faces it
     if (!(stretch > 0)) return {0, 0};
@@ -70,15 +71,17 @@ struct FilmLattice::Frame {
     if (low > high) return {0, 0};
     const double reach = radius / stretch;
     const double slack = column_step();
-    const auto nearest = [&](double line) { return -along.dot(start + (y0 + line * step) * up) / (stretch * stretch); };
+    const auto nearest = [&](double line) {
+      return -along.dot(start + (y0 + line * step) * up) / (stretch * stretch);
+    };
     const double s1 = nearest(low);
     const double s2 = nearest(high);
     if (std::max(s1, s2) + reach < -slack || std::min(s1, s2) - reach > grid.length_m + slack) return {0, 0};
     return {static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(high) + 1};
   }
 
-  /// Visits (i, squared distance from the axis, depth) for those of `count` places, from s0 on and `step` apart at
-  /// height y, that lie within the radius.
+  /// Visits (i, squared distance from the axis, depth) for those of `count` places, from s0 on and `step`
+  /// apart at height y, that lie within the radius.
   template <class Visit>
   void visit_line(double y, double s0, double step, std::uint32_t count, Visit visit) const {
     const Eigen::Vector2d place = start + y * up + s0 * along;
@@ -105,13 +108,16 @@ FilmLattice::Frame FilmLattice::frame_of(std::uint32_t triangle, const Eigen::Ve
   const Eigen::Vector3d along = (mesh_.corner(triangle, (grid.apex + 2) % 3) - origin).normalized();
   const Eigen::Vector3d up = mesh_.area_vector(triangle).cross(along).normalized();
   const Eigen::Matrix3d axes = frame_about(axis_O);
-  const auto across = [&](const Eigen::Vector3d& v) { return Eigen::Vector2d(axes.col(0).dot(v), axes.col(1).dot(v)); };
+  const auto across = [&](const Eigen::Vector3d& v) {
+    return Eigen::Vector2d(axes.col(0).dot(v), axes.col(1).dot(v));
+  };
   const Eigen::Vector3d from_axis = origin - center_O;
   return {across(from_axis), across(along),  across(up), axis_O.dot(from_axis),
           axis_O.dot(along), axis_O.dot(up), radius_m,   grid};
 }
 
-FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mesh), grids_(mesh.triangle_count()) {
+FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m)
+    : mesh_(mesh), grids_(mesh.triangle_count()) {
   constexpr std::uint32_t kTileNodes = 4096, kTileRowsMin = 16, kTileRowsMax = 4096;
   CHECK(spacing_m > 0);
   double node_estimate = 0;
@@ -123,7 +129,8 @@ FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mes
     const double length_m = base.norm();
     grid.length_m = static_cast<float>(length_m);
     grid.height_m = length_m > 0 ? static_cast<float>(2 * mesh.area_vector(t).norm() / length_m) : 0;
-    grid.foot_m = length_m > 0 ? static_cast<float>(base.dot(mesh.corner(t, grid.apex) - origin) / length_m) : 0;
+    grid.foot_m =
+        length_m > 0 ? static_cast<float>(base.dot(mesh.corner(t, grid.apex) - origin) / length_m) : 0;
     grid.columns = steps_over(length_m, spacing_m);
     grid.rows = steps_over(grid.height_m, spacing_m);
     node_estimate += (.5 * grid.columns + 2) * (grid.rows + 1.);
@@ -134,21 +141,23 @@ FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mes
     grid.rows_per_tile =
         static_cast<std::uint16_t>(std::clamp(kTileNodes / (grid.columns + 1), kTileRowsMin, kTileRowsMax));
     grid.first_tile = tile_count();
-    tile_triangle_.insert(tile_triangle_.end(), grid.rows / grid.rows_per_tile + 1, static_cast<std::uint32_t>(t));
+    tile_triangle_.insert(tile_triangle_.end(), grid.rows / grid.rows_per_tile + 1,
+                          static_cast<std::uint32_t>(t));
   }
 
   std::uint32_t node_count = 0;
   for (Grid& grid : grids_) {
     grid.first_row = static_cast<std::uint32_t>(rows_.size());
     for (std::uint32_t row = 0; row <= grid.rows; ++row) {
-      // The triangle narrows upwards, so what it is widest in, of the strips below and above the row, is the lower line
-      // of the one below.
+      // The triangle narrows upwards, so what it is widest in, of the strips below and above the row, is the
+      // lower line of the one below.
       const double share = row > 0 ? (row - 1.) / grid.rows : 0;
       const double foot = grid.length_m > 0 ? grid.foot_m / grid.length_m : 0;
-      const auto first =
-          static_cast<std::uint32_t>(std::clamp(std::floor(share * foot * grid.columns), 0., grid.columns - 1.));
+      const auto first = static_cast<std::uint32_t>(
+          std::clamp(std::floor(share * foot * grid.columns), 0., grid.columns - 1.));
       const double end = std::ceil((1 - share * (1 - foot)) * grid.columns);
-      const auto last = static_cast<std::uint32_t>(std::clamp(end, first + 1., static_cast<double>(grid.columns)));
+      const auto last =
+          static_cast<std::uint32_t>(std::clamp(end, first + 1., static_cast<double>(grid.columns)));
       rows_.push_back({node_count, first});
       node_count += last - first + 1;
     }
@@ -157,7 +166,8 @@ FilmLattice::FilmLattice(const TexturedMesh& mesh, double spacing_m) : mesh_(mes
   doses_.assign(node_count, 0);
 }
 
-void FilmLattice::append_tiles(std::uint32_t triangle, const Spot& spot, std::vector<std::uint32_t>& tiles) const {
+void FilmLattice::append_tiles(std::uint32_t triangle, const Spot& spot,
+                               std::vector<std::uint32_t>& tiles) const {
   const Grid& grid = grids_[triangle];
   const Eigen::Vector3d area = mesh_.area_vector(triangle);
   if (-spot.direction_O.dot(area) <= kGrazingCosine * area.norm()) return;
@@ -182,7 +192,8 @@ void FilmLattice::expose(std::uint32_t tile, std::span<const Spot* const> spots)
     const RowRange near = frame.lines_near(0, grid.rows + 1);
     const double radius2 = spot->radius_m * spot->radius_m;
     const double cosine = -spot->direction_O.dot(normal_O);
-    const auto peak = static_cast<float>(2 * spot->energy_j * cosine / (std::numbers::pi * radius2 * kInside));
+    const auto peak =
+        static_cast<float>(2 * spot->energy_j * cosine / (std::numbers::pi * radius2 * kInside));
     const auto falloff = static_cast<float>(-2 / radius2);
     const double window = kDepthWindow * frame.radius;
     const double row_step = frame.row_step();
@@ -193,7 +204,8 @@ void FilmLattice::expose(std::uint32_t tile, std::span<const Spot* const> spots)
       frame.visit_line(j * row_step, row.first_column * column_step, column_step, count,
                        [&](std::uint32_t i, double distance2, double depth) {
                          if (std::abs(depth) > window) return;
-                         doses_[row.first_node + i] += peak * std::exp(falloff * static_cast<float>(distance2));
+                         doses_[row.first_node + i] +=
+                             peak * std::exp(falloff * static_cast<float>(distance2));
                        });
     }
   }
@@ -235,8 +247,8 @@ void FilmLattice::append_points(std::uint32_t triangle, const Eigen::Vector3d& c
   for (std::uint32_t j = rows.first; j < rows.end; ++j) {
     const Row& row = rows_[grid.first_row + j];
     const std::uint32_t count = rows_[grid.first_row + j + 1].first_node - row.first_node;
-    // The band of half a step below to half a step above the row is a trapezium: its width at mid-height times its
-    // height is its area.
+    // The band of half a step below to half a step above the row is a trapezium: its width at mid-height
+    // times its height is its area.
     const double low = std::max(j - .5, 0.) / grid.rows;
     const double high = std::min(j + .5, static_cast<double>(grid.rows)) / grid.rows;
     const double middle = .5 * (low + high);

@@ -19,8 +19,8 @@ std::vector<float> gaussian_taps(double sigma) {
 }
 
 /// One plane, blurred along the rows (at every step-th column), and transposed: twice gives both directions.
-std::vector<float> blur_rows(const std::vector<float>& plane, int width, int height, const std::vector<float>& taps,
-                             int step) {
+std::vector<float> blur_rows(const std::vector<float>& plane, int width, int height,
+                             const std::vector<float>& taps, int step) {
   const int out_width = (width + step / 2) / step;
   const int radius = static_cast<int>(taps.size() / 2);
   std::vector<float> out(static_cast<std::size_t>(out_width) * height);
@@ -36,7 +36,8 @@ std::vector<float> blur_rows(const std::vector<float>& plane, int width, int hei
         const int end = std::min(x + radius, width - 1);
         if (end < begin) continue;
         const Eigen::Index count = end - begin + 1;
-        const Eigen::Map<const Eigen::VectorXf> values(row + begin, count), weights(&taps[begin - x + radius], count);
+        const Eigen::Map<const Eigen::VectorXf> values(row + begin, count),
+            weights(&taps[begin - x + radius], count);
         out[static_cast<std::size_t>(i) * height + y] = values.dot(weights);
       }
     }

@@ -5,8 +5,8 @@
 
 namespace hilbrush {
 
-/// Barycentric coordinates of (x, y) in a projected triangle: value_k = constant_k + x dx_k + y dy_k. None for a
-/// triangle seen edge-on.
+/// Barycentric coordinates of (x, y) in a projected triangle: value_k = constant_k + x dx_k + y dy_k. None
+/// for a triangle seen edge-on.
 struct OrthographicView::PlaneCoordinates {
   Eigen::Vector3d constant, dx, dy;
   bool is_valid = false;
@@ -17,14 +17,15 @@ struct OrthographicView::PlaneCoordinates {
     if (!is_valid) return;
     dx = Eigen::Vector3d(b.y() - c.y(), c.y() - a.y(), a.y() - b.y()) / area;
     dy = Eigen::Vector3d(c.x() - b.x(), a.x() - c.x(), b.x() - a.x()) / area;
-    constant =
-        Eigen::Vector3d(b.x() * c.y() - c.x() * b.y(), c.x() * a.y() - a.x() * c.y(), a.x() * b.y() - b.x() * a.y()) /
-        area;
+    constant = Eigen::Vector3d(b.x() * c.y() - c.x() * b.y(), c.x() * a.y() - a.x() * c.y(),
+                               a.x() * b.y() - b.x() * a.y()) /
+               area;
   }
   Eigen::Vector3d at(double x, double y) const { return constant + x * dx + y * dy; }
 };
 
-OrthographicView::OrthographicView(const TexturedMesh& mesh, const ViewDirection& direction, double pixel_m, int margin)
+OrthographicView::OrthographicView(const TexturedMesh& mesh, const ViewDirection& direction, double pixel_m,
+                                   int margin)
     : mesh_(mesh),
       right_O_(direction.right_O()),
       up_O_(direction.up_O),
@@ -49,7 +50,8 @@ OrthographicView::OrthographicView(const TexturedMesh& mesh, const ViewDirection
 }
 
 Eigen::Vector3d OrthographicView::project(const Eigen::Vector3d& p_O) const {
-  return {(right_O_.dot(p_O) - left_m_) / pixel_m_, (top_m_ - up_O_.dot(p_O)) / pixel_m_, forward_O_.dot(p_O)};
+  return {(right_O_.dot(p_O) - left_m_) / pixel_m_, (top_m_ - up_O_.dot(p_O)) / pixel_m_,
+          forward_O_.dot(p_O)};
 }
 
 void OrthographicView::fill(std::uint32_t triangle) {
@@ -62,7 +64,8 @@ void OrthographicView::fill(std::uint32_t triangle) {
   const double x_min = std::min({a.x(), b.x(), c.x()});
   const double x_max = std::max({a.x(), b.x(), c.x()});
   const int first_row = std::max(0, static_cast<int>(std::ceil(std::min({a.y(), b.y(), c.y()}) - .5)));
-  const int last_row = std::min(height_ - 1, static_cast<int>(std::floor(std::max({a.y(), b.y(), c.y()}) - .5)));
+  const int last_row =
+      std::min(height_ - 1, static_cast<int>(std::floor(std::max({a.y(), b.y(), c.y()}) - .5)));
   // Along an outline a front and a back face meet at equal depth: the front, which has the film, is shown.
   const double behind_m = mesh_.area_vector(triangle).dot(forward_O_) < 0 ? 0 : .05 * pixel_m_;
   constexpr double kRounding = 1e-9;  // neighbors share their border's pixels rather than leave gaps
@@ -95,7 +98,8 @@ void OrthographicView::fill(std::uint32_t triangle) {
 }
 
 OrthographicView::PlaneCoordinates OrthographicView::coordinates_of(std::uint32_t triangle) const {
-  return {project(mesh_.corner(triangle, 0)), project(mesh_.corner(triangle, 1)), project(mesh_.corner(triangle, 2))};
+  return {project(mesh_.corner(triangle, 0)), project(mesh_.corner(triangle, 1)),
+          project(mesh_.corner(triangle, 2))};
 }
 
 OrthographicView::Pixel OrthographicView::pixel(int x, int y) const {
@@ -104,8 +108,8 @@ OrthographicView::Pixel OrthographicView::pixel(int x, int y) const {
   return pixel_on(triangle, coordinates_of(triangle), x, y);
 }
 
-OrthographicView::Pixel OrthographicView::pixel_on(std::uint32_t triangle, const PlaneCoordinates& coordinates, int x,
-                                                   int y) const {
+OrthographicView::Pixel OrthographicView::pixel_on(std::uint32_t triangle,
+                                                   const PlaneCoordinates& coordinates, int x, int y) const {
   const Side side = mesh_.area_vector(triangle).dot(forward_O_) < 0 ? Side::kFront : Side::kBack;
   const Eigen::Vector3d inside = coordinates.at(x + .5, y + .5).cwiseMax(0.);
   return {side, {triangle, inside / inside.sum()}};
@@ -120,13 +124,16 @@ void OrthographicView::read_row(int y, std::vector<Pixel>& pixels) const {
       continue;
     }
     const PlaneCoordinates coordinates = coordinates_of(triangle);
-    for (; x < width_ && triangle_at(x, y) == triangle; ++x) pixels[x] = pixel_on(triangle, coordinates, x, y);
+    for (; x < width_ && triangle_at(x, y) == triangle; ++x)
+      pixels[x] = pixel_on(triangle, coordinates, x, y);
   }
 }
 
-std::optional<Eigen::Vector2i> OrthographicView::pixel_of(const Eigen::Vector3d& p_O, double tolerance_m) const {
+std::optional<Eigen::Vector2i> OrthographicView::pixel_of(const Eigen::Vector3d& p_O,
+                                                          double tolerance_m) const {
   const Eigen::Vector3d place = project(p_O);
-  const Eigen::Vector2i pixel(static_cast<int>(std::floor(place.x())), static_cast<int>(std::floor(place.y())));
+  const Eigen::Vector2i pixel(static_cast<int>(std::floor(place.x())),
+                              static_cast<int>(std::floor(place.y())));
   if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() >= width_ || pixel.y() >= height_) return std::nullopt;
   const float depth_m = depths_m_[static_cast<std::size_t>(pixel.y()) * width_ + pixel.x()];
   if (depth_m < place.z() - tolerance_m) return std::nullopt;

@@ -16,13 +16,13 @@ struct ViewDirection {
   Eigen::Vector3d right_O() const { return forward_O.cross(up_O); }
 };
 
-/// The mesh as seen from infinitely far away: which triangle each pixel shows. Filled by scan conversion with a depth
-/// buffer, which for square pixels in parallel rays gives the same picture as casting a ray for each, many times
-/// faster.
+/// The mesh as seen from infinitely far away: which triangle each pixel shows. Filled by scan conversion with
+/// a depth buffer, which for square pixels in parallel rays gives the same picture as casting a ray for each,
+/// many times faster.
 class OrthographicView {
  public:
-  /// Square pixels of side pixel_m, just enough of them for the whole mesh and a margin of `margin` pixels. `mesh` must
-  /// outlive the view.
+  /// Square pixels of side pixel_m, just enough of them for the whole mesh and a margin of `margin` pixels.
+  /// `mesh` must outlive the view.
   OrthographicView(const TexturedMesh& mesh, const ViewDirection& direction, double pixel_m, int margin = 0);
 
   int width() const { return width_; }
@@ -45,7 +45,9 @@ class OrthographicView {
 
   Eigen::Vector3d project(const Eigen::Vector3d& p_O) const;  ///< x and y in pixels, depth in meters
   void fill(std::uint32_t triangle);
-  std::uint32_t triangle_at(int x, int y) const { return triangles_[static_cast<std::size_t>(y) * width_ + x]; }
+  std::uint32_t triangle_at(int x, int y) const {
+    return triangles_[static_cast<std::size_t>(y) * width_ + x];
+  }
 
   struct PlaneCoordinates;
   PlaneCoordinates coordinates_of(std::uint32_t triangle) const;

@@ -32,15 +32,17 @@ std::vector<float> means_at(const Film& film, const ToneField* tone, std::span<c
 
 }  // namespace
 
-void read_means(const Film& film, const ToneField* tone, const SurfacePoint& center, std::span<const double> sigmas,
-                std::span<PictureMeans> means, std::vector<FilmPoint>& points) {
+void read_means(const Film& film, const ToneField* tone, const SurfacePoint& center,
+                std::span<const double> sigmas, std::span<PictureMeans> means,
+                std::vector<FilmPoint>& points) {
   CHECK_EQ(sigmas.size(), means.size());
   CHECK_LE(sigmas.size(), std::size_t{4});
   std::array<double, 4> weights{};
   std::fill(means.begin(), means.end(), PictureMeans{});
   const Eigen::Vector3d center_O = position(film.mesh(), center);
   const Eigen::Vector3d normal_O = face_normal(film.mesh(), center);
-  film.points_near(center, kCutSigmas * *std::max_element(sigmas.begin(), sigmas.end()) * film.pitch_m(), points);
+  film.points_near(center, kCutSigmas * *std::max_element(sigmas.begin(), sigmas.end()) * film.pitch_m(),
+                   points);
   for (const FilmPoint& point : points) {
     const Eigen::Vector3d offset = (point.position_O - center_O) / film.pitch_m();
     const double depth = offset.dot(normal_O);

@@ -13,15 +13,16 @@ struct PictureMeans {
   double wanted = 0, painted = 0;
 };
 
-/// Area-weighted Gaussian means around `center`, sigma `sigmas[k]` pitches in the tangent plane, cut at 3 sigma, only
-/// of film that faces the point and lies within 3 sigma of depth. `points` is room for the film's nodes. A piece of
-/// surface too small to own a node within reach: the point itself. Without `tone` wanted stays 0, which saves half the
-/// time.
-void read_means(const Film& film, const ToneField* tone, const SurfacePoint& center, std::span<const double> sigmas,
-                std::span<PictureMeans> means, std::vector<FilmPoint>& points);
+/// Area-weighted Gaussian means around `center`, sigma `sigmas[k]` pitches in the tangent plane, cut at 3
+/// sigma, only of film that faces the point and lies within 3 sigma of depth. `points` is room for the film's
+/// nodes. A piece of surface too small to own a node within reach: the point itself. Without `tone` wanted
+/// stays 0, which saves half the time.
+void read_means(const Film& film, const ToneField* tone, const SurfacePoint& center,
+                std::span<const double> sigmas, std::span<PictureMeans> means,
+                std::vector<FilmPoint>& points);
 
-/// What the predictive loop asks: a film on which every dot is exposed at normal incidence by a perfect cell. Keeps
-/// references. Same answers for any number of threads. Memory: a film, see film_lattice.h.
+/// What the predictive loop asks: a film on which every dot is exposed at normal incidence by a perfect cell.
+/// Keeps references. Same answers for any number of threads. Memory: a film, see film_lattice.h.
 PicturePredictor film_predictor(const CellDescription& cell, const ToneField& tone);
 
 /// Exposes dots straight where they lie, with their levels.

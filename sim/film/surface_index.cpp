@@ -36,15 +36,17 @@ struct SurfaceIndex::Implementation {
   Implementation& operator=(const Implementation&) = delete;
 
   void fill(RTCGeometry geometry) const {
-    auto* vertices =
-        static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                    3 * sizeof(float), std::max<std::size_t>(mesh.vertices.size(), 1)));
-    auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), mesh.triangle_count()));
+    auto* vertices = static_cast<float*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                std::max<std::size_t>(mesh.vertices.size(), 1)));
+    auto* indices = static_cast<std::uint32_t*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(std::uint32_t), mesh.triangle_count()));
     CHECK(vertices != nullptr && indices != nullptr);
     for (const Eigen::Vector3d& vertex : mesh.vertices)
       for (int k = 0; k < 3; ++k) *vertices++ = static_cast<float>(vertex[k]);
-    for (const auto& triangle : mesh.triangles) indices = std::copy(triangle.begin(), triangle.end(), indices);
+    for (const auto& triangle : mesh.triangles)
+      indices = std::copy(triangle.begin(), triangle.end(), indices);
   }
 
   static bool collect(RTCPointQueryFunctionArguments* arguments) {
@@ -53,7 +55,8 @@ struct SurfaceIndex::Implementation {
   }
 };
 
-SurfaceIndex::SurfaceIndex(const TexturedMesh& mesh) : implementation_(std::make_unique<Implementation>(mesh)) {}
+SurfaceIndex::SurfaceIndex(const TexturedMesh& mesh)
+    : implementation_(std::make_unique<Implementation>(mesh)) {}
 SurfaceIndex::~SurfaceIndex() = default;
 SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;
 

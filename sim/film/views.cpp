@@ -14,12 +14,19 @@ namespace hilbrush {
 
 namespace {
 
-constexpr Color kBackground{104, 116, 130}, kBackFace{126, 106, 92}, kInk{245, 245, 245}, kSkipped{230, 20, 30};
+constexpr Color kBackground{104, 116, 130}, kBackFace{126, 106, 92}, kInk{245, 245, 245},
+    kSkipped{230, 20, 30};
 constexpr Color kTooLight{30, 90, 200}, kRight{247, 247, 247}, kTooDark{215, 95, 0};
 constexpr double kFullError = .2;
 constexpr int kPad = 12, kSheetPixels = 320, kViewPixels = 900;
 
-enum Channel { kWanted, kPainted, kError, kBack, kChannelCount };  // kBack: share of the pixel that shows a back face
+enum Channel {
+  kWanted,
+  kPainted,
+  kError,
+  kBack,
+  kChannelCount
+};  // kBack: share of the pixel that shows a back face
 constexpr std::array<const char*, 3> kPanelNames{"wanted", "painted", "error"};
 
 /// One view with everything that its panels show.
@@ -55,7 +62,8 @@ ViewPicture reduced(const ViewPicture& view, int factor) {
   return out;
 }
 
-void fill_row(const Film& film, const ToneField& tone, const OrthographicView& view, int y, MaskedImage& image) {
+void fill_row(const Film& film, const ToneField& tone, const OrthographicView& view, int y,
+              MaskedImage& image) {
   std::vector<OrthographicView::Pixel> pixels;
   view.read_row(y, pixels);
   for (int x = 0; x < view.width(); ++x) {
@@ -68,8 +76,8 @@ void fill_row(const Film& film, const ToneField& tone, const OrthographicView& v
   }
 }
 
-/// Each pixel of the picture is the mean of `oversampling` pixels of the view in each direction, so that dots finer
-/// than a pixel are averaged.
+/// Each pixel of the picture is the mean of `oversampling` pixels of the view in each direction, so that dots
+/// finer than a pixel are averaged.
 ViewPicture render(const Film& film, const ToneField& tone, std::span<const Eigen::Vector3d> skipped_O,
                    const ViewDirection& direction, double pixel_m, int oversampling) {
   const OrthographicView view(film.mesh(), direction, pixel_m / oversampling, 2 * oversampling);
@@ -92,7 +100,8 @@ double srgb_encoded(double linear) {
 
 Color mixed(const Color& a, const Color& b, double share_of_b) {
   Color color;
-  for (int k = 0; k < 3; ++k) color[k] = static_cast<std::uint8_t>(std::lround(a[k] + (b[k] - a[k]) * share_of_b));
+  for (int k = 0; k < 3; ++k)
+    color[k] = static_cast<std::uint8_t>(std::lround(a[k] + (b[k] - a[k]) * share_of_b));
   return color;
 }
 
@@ -120,7 +129,8 @@ void draw_panel(Canvas& canvas, int left, int top, const ViewPicture& view, int 
       canvas.set(left + x, top + y, mixed(kBackground, object, std::min(film_share + back_share, 1.f)));
     }
   if (channel == kWanted) return;
-  for (const Eigen::Vector2i& pixel : view.skipped) canvas.mark(left + pixel.x(), top + pixel.y(), 1, kSkipped);
+  for (const Eigen::Vector2i& pixel : view.skipped)
+    canvas.mark(left + pixel.x(), top + pixel.y(), 1, kSkipped);
 }
 
 std::string caption(const ViewPicture& view, int channel) {
@@ -131,12 +141,15 @@ std::string caption(const ViewPicture& view, int channel) {
 Canvas triptych(const ViewPicture& view, const CellDescription::Paint& paint) {
   constexpr int kScale = 2;
   int panel = view.image.width;
-  for (int k = kWanted; k <= kError; ++k) panel = std::max(panel, Canvas::text_width(caption(view, k), kScale));
-  Canvas canvas(3 * panel + 4 * kPad, view.image.height + Canvas::text_height(kScale) + 3 * kPad, kBackground);
+  for (int k = kWanted; k <= kError; ++k)
+    panel = std::max(panel, Canvas::text_width(caption(view, k), kScale));
+  Canvas canvas(3 * panel + 4 * kPad, view.image.height + Canvas::text_height(kScale) + 3 * kPad,
+                kBackground);
   for (int k = kWanted; k <= kError; ++k) {
     const int left = kPad + k * (panel + kPad);
     canvas.write(left, kPad, caption(view, k), kScale, kInk);
-    draw_panel(canvas, left + (panel - view.image.width) / 2, Canvas::text_height(kScale) + 2 * kPad, view, k, paint);
+    draw_panel(canvas, left + (panel - view.image.width) / 2, Canvas::text_height(kScale) + 2 * kPad, view, k,
+               paint);
   }
   return canvas;
 }
@@ -185,12 +198,18 @@ std::array<ViewDirection, 6> picture_views() {
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX();
   const Eigen::Vector3d y = Eigen::Vector3d::UnitY();
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  return {{{"front", y, z}, {"right", -x, z}, {"back", -y, z}, {"left", x, z}, {"top", -z, y}, {"bottom", z, -y}}};
+  return {{{"front", y, z},
+           {"right", -x, z},
+           {"back", -y, z},
+           {"left", x, z},
+           {"top", -z, y},
+           {"bottom", z, -y}}};
 }
 
 std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneField& tone,
                                                   std::span<const Eigen::Vector3d> skipped_O,
-                                                  const std::filesystem::path& folder, const Progress& progress) {
+                                                  const std::filesystem::path& folder,
+                                                  const Progress& progress) {
   const std::filesystem::path views_folder = folder / "views";
   std::error_code error;
   std::filesystem::create_directories(views_folder, error);
@@ -198,7 +217,8 @@ std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneFi
 
   const double pixel_m = picture_pixel_m(film);
   constexpr double kPixelsPerPitch = 1.5;
-  const int oversampling = std::clamp(static_cast<int>(std::ceil(kPixelsPerPitch * pixel_m / film.pitch_m())), 1, 4);
+  const int oversampling =
+      std::clamp(static_cast<int>(std::ceil(kPixelsPerPitch * pixel_m / film.pitch_m())), 1, 4);
   const CellDescription::Paint& paint = film.cell().paint;
   std::vector<std::filesystem::path> files;
   std::vector<ViewPicture> small_views;
@@ -207,7 +227,8 @@ std::vector<std::filesystem::path> write_pictures(const Film& film, const ToneFi
     files.push_back(views_folder / (std::string(direction.name) + ".png"));
     save_png(triptych(view, paint).picture(), files.back());
     const auto [low, high] = bounds(film.mesh());
-    const int factor = std::max(1, static_cast<int>(std::ceil((high - low).maxCoeff() / pixel_m / kSheetPixels)));
+    const int factor =
+        std::max(1, static_cast<int>(std::ceil((high - low).maxCoeff() / pixel_m / kSheetPixels)));
     small_views.push_back(reduced(view, factor));
     progress.step(files.size(), 7);
   }

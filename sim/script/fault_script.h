@@ -24,7 +24,8 @@ enum class WireFaultKind {
   kException,      ///< the device says that it failed, and does nothing
   kRefused,        ///< the device says no, and does nothing
   kLateAnswer,     ///< obeyed at once, answered duration_s later
-  /// Closed instead of answered; with a trigger of at_s alone, all connections of the device are closed at that time,
+  /// Closed instead of answered; with a trigger of at_s alone, all connections of the device are closed at
+  /// that time,
   /// whether or not a message comes. A serial line goes silent for duration_s.
   kDroppedConnection,
   // Of the device, for duration_s.

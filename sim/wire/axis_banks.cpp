@@ -8,8 +8,8 @@ namespace hilbrush {
 
 DriveAxis::Report DriveAxis::present() const {
   const bool is_moving = cell_.is_moving(axis_);
-  const bool is_there =
-      cell_.is_settled(axis_) && std::abs(cell_.position(axis_) - cell_.target(axis_)) <= TrueCell::kOutOfPosition;
+  const bool is_there = cell_.is_settled(axis_) &&
+                        std::abs(cell_.position(axis_) - cell_.target(axis_)) <= TrueCell::kOutOfPosition;
   return {steps(cell_.position(axis_)), steps(cell_.profile(axis_)), is_moving, is_there};
 }
 
@@ -61,8 +61,8 @@ ModbusOutcome OrientalBank::read(std::uint16_t address, std::span<std::uint16_t>
     const auto here = static_cast<std::uint16_t>(address + i);
     const auto first = static_cast<std::uint16_t>(here & ~1u);
     const bool is_direct = first >= kDirectData && first < kDirectDataEnd;
-    const bool is_known =
-        is_direct || first == 0x007C || first == 0x007E || first == 0x0080 || first == 0x0120 || first == 0x0122;
+    const bool is_known = is_direct || first == 0x007C || first == 0x007E || first == 0x0080 ||
+                          first == 0x0120 || first == 0x0122;
     if (!is_known) return ModbusOutcome::kIllegalAddress;
     const std::uint32_t value = value_at(first);
     values[i] = here == first ? high_word(value) : low_word(value);
@@ -226,7 +226,8 @@ ModbusOutcome Cia402Bank::read(std::uint16_t address, std::span<std::uint16_t> v
 
 ModbusOutcome Cia402Bank::write(std::uint16_t address, std::span<const std::uint16_t> values) {
   if (values.size() != cia402_words(address)) return ModbusOutcome::kIllegalAddress;
-  const std::uint32_t value = values[0] | (values.size() == 2 ? static_cast<std::uint32_t>(values[1]) << 16 : 0);
+  const std::uint32_t value =
+      values[0] | (values.size() == 2 ? static_cast<std::uint32_t>(values[1]) << 16 : 0);
   switch (address) {
     case 0x6040:
       control(values[0]);
@@ -359,7 +360,8 @@ ModbusOutcome LeadshineBank::write(std::uint16_t address, std::span<const std::u
     if (values[0] == 0x1111) drive_.clear_alarm();
     return ModbusOutcome::kDone;
   }
-  if (address < 0x6200 || address + values.size() > 0x6200 + path_.size()) return ModbusOutcome::kIllegalAddress;
+  if (address < 0x6200 || address + values.size() > 0x6200 + path_.size())
+    return ModbusOutcome::kIllegalAddress;
   std::copy(values.begin(), values.end(), path_.begin() + (address - 0x6200));
   // Path 0 may carry its trigger along, in its last word.
   if (address + values.size() == 0x6208 && path_[7] == 0x10)
@@ -378,7 +380,8 @@ bool LeadshineBank::trigger(std::uint16_t code) {
   const double speed = path_[3] / 60. * kTurn;
   const double ramp_ms = std::max<double>({1, static_cast<double>(path_[4]), static_cast<double>(path_[5])});
   const double acceleration = 1000. / 60 * kTurn / (ramp_ms * 1e-3);
-  if (code == 0x20) return drive_.move(drive_.steps(drive_.home()), speed > 0 ? speed : kTurn / 4, acceleration);
+  if (code == 0x20)
+    return drive_.move(drive_.steps(drive_.home()), speed > 0 ? speed : kTurn / 4, acceleration);
   if (code != 0x10) return false;
   auto target = static_cast<std::int32_t>(static_cast<std::uint32_t>(path_[1]) << 16 | path_[2]);
   if (path_[0] == 0x41)

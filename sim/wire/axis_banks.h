@@ -5,9 +5,9 @@
 #include "sim/wire/modbus_server.h"
 #include "sim/wire/time_record.h"
 
-/// Positioning axes as banks of Modbus registers, one bank an axis, each with its maker's table of registers. Positions
-/// are whole steps: `steps_per_unit` steps make one rad (or m). What each table leaves out is answered with
-/// exception 2.
+/// Positioning axes as banks of Modbus registers, one bank an axis, each with its maker's table of registers.
+/// Positions are whole steps: `steps_per_unit` steps make one rad (or m). What each table leaves out is
+/// answered with exception 2.
 namespace hilbrush {
 
 /// What all these drives have in common: an axis of the cell, in steps, and an alarm.
@@ -62,7 +62,8 @@ class DriveBank : public RegisterBank {
   DriveAxis drive_;
 };
 
-/// Oriental Motor AZ: direct data operation, driver inputs and outputs. Two words a value, the high one first.
+/// Oriental Motor AZ: direct data operation, driver inputs and outputs. Two words a value, the high one
+/// first.
 class OrientalBank final : public DriveBank {
  public:
   using DriveBank::DriveBank;
@@ -83,8 +84,8 @@ class OrientalBank final : public DriveBank {
   bool is_free_ = false;
 };
 
-/// CiA 402 profile position with each object at the register of its index, as on Mitsubishi's MR-JE-C: an object is
-/// read or written whole, 32-bit ones as two words, the low one first.
+/// CiA 402 profile position with each object at the register of its index, as on Mitsubishi's MR-JE-C: an
+/// object is read or written whole, 32-bit ones as two words, the low one first.
 class Cia402Bank final : public DriveBank {
  public:
   explicit Cia402Bank(const DriveAxis& axis);
@@ -122,7 +123,8 @@ class LeadshineBank final : public DriveBank {
   std::uint16_t status();
   bool trigger(std::uint16_t code);
 
-  std::array<std::uint16_t, 8> path_{};  ///< 0x6200: mode, position (2), speed, acceleration, deceleration, ...
+  std::array<std::uint16_t, 8>
+      path_{};  ///< 0x6200: mode, position (2), speed, acceleration, deceleration, ...
   bool is_homed_ = true;
   bool has_command_done_ = true;
 };

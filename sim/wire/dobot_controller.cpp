@@ -47,8 +47,8 @@ std::array<double, 4> pose_of(const CellDescription::Arm& arm, const std::array<
 }
 
 /// The joints of a pose, the elbow on the side of `near`; nothing if it is out of reach.
-std::optional<std::array<double, 4>> joints_of(const CellDescription::Arm& arm, const std::array<double, 4>& pose,
-                                               double near_j2) {
+std::optional<std::array<double, 4>> joints_of(const CellDescription::Arm& arm,
+                                               const std::array<double, 4>& pose, double near_j2) {
   const double x = pose[0] * 1e-3;
   const double y = pose[1] * 1e-3;
   const double a = arm.upper_arm_m;
@@ -102,7 +102,8 @@ std::string DobotController::dashboard(const std::string& name, const Arguments&
     frame();
     std::array<double, 4> values{};
     for (std::size_t i = 0; i < 4; ++i) values[i] = to_wire(i, last_.positions[i]);
-    return answered(kOk, listed(name == "getangle" ? values : pose_of(cell_.description().arm, last_.positions)));
+    return answered(kOk,
+                    listed(name == "getangle" ? values : pose_of(cell_.description().arm, last_.positions)));
   }
   if (name == "speedfactor") return set_ratio(arguments, speed_factor_);
   if (name == "speedj") return set_ratio(arguments, joint_speed_);
@@ -335,7 +336,9 @@ std::string DobotController::frame() {
     put(frame, 624 + 8 * i, actual[i]);
     put(frame, 768 + 8 * i, wanted[i]);
   }
-  const auto flag = [&](std::size_t offset, bool is_set) { put(frame, offset, static_cast<std::uint8_t>(is_set)); };
+  const auto flag = [&](std::size_t offset, bool is_set) {
+    put(frame, offset, static_cast<std::uint8_t>(is_set));
+  };
   flag(1014, last_.mode == 7);
   flag(1015, is_paused_);
   put(frame, 1016, static_cast<std::uint8_t>(std::lround(speed_factor_ * 100)));

@@ -12,15 +12,15 @@
 #include "sim/wire/time_record.h"
 #include "sim/wire/wire_session.h"
 
-/// A Dobot 4-axis controller: one queue of motion, waits and outputs, its state, and the three conversations about them
-/// (dashboard, motion, feedback). Joints in degrees, J3 in mm, as the wire has them.
+/// A Dobot 4-axis controller: one queue of motion, waits and outputs, its state, and the three conversations
+/// about them (dashboard, motion, feedback). Joints in degrees, J3 in mm, as the wire has them.
 ///
-/// Three properties of real controllers matter for safety: "accepted" on the motion port is not "done"; outputs keep
-/// their level when the queue is cleared by ResetRobot, an alarm or a power cut of the drives; the queue goes on when
-/// the host has disconnected.
+/// Three properties of real controllers matter for safety: "accepted" on the motion port is not "done";
+/// outputs keep their level when the queue is cleared by ResetRobot, an alarm or a power cut of the drives;
+/// the queue goes on when the host has disconnected.
 ///
-/// After "TCP/IP Remote Control Interface Guide (4axis)", controller V1.6. Joint-space motion only (JointMovJ, MovJ,
-/// MoveJog); straight lines are refused as unknown.
+/// After "TCP/IP Remote Control Interface Guide (4axis)", controller V1.6. Joint-space motion only
+/// (JointMovJ, MovJ, MoveJog); straight lines are refused as unknown.
 namespace hilbrush {
 
 struct DobotControllerOptions {
@@ -34,7 +34,8 @@ class DobotController {
   static constexpr std::size_t kQueueMax = 256;
   static constexpr std::size_t kFrameBytes = 1440;
 
-  DobotController(TrueCell& cell, FaultInjector& faults, TimeRecord& times, const DobotControllerOptions& options = {});
+  DobotController(TrueCell& cell, FaultInjector& faults, TimeRecord& times,
+                  const DobotControllerOptions& options = {});
 
   /// What the dashboard or the motion port answers to a command, up to and without the echo: "0,{5},".
   std::string dashboard(const std::string& name, const std::vector<std::string>& arguments);

@@ -29,7 +29,8 @@ std::vector<std::string> split_arguments(std::string_view list) {
 std::size_t DobotTextSession::message_bytes(std::string_view buffer) const {
   const std::size_t open = buffer.find('(');
   const std::size_t line_end = buffer.find('\n');
-  if (open == std::string_view::npos || line_end < open) return line_end == std::string_view::npos ? 0 : line_end + 1;
+  if (open == std::string_view::npos || line_end < open)
+    return line_end == std::string_view::npos ? 0 : line_end + 1;
   int depth = 0;
   for (std::size_t i = open; i < buffer.size(); ++i) {
     if (buffer[i] == '(') ++depth;
@@ -49,14 +50,15 @@ std::string DobotTextSession::answer(std::string_view message) {
   const std::size_t open = command.find('(');
   if (open == std::string::npos || command.back() != ')') return "-10000,{}," + command + ";";
   const std::string name = lower_case(trimmed(std::string_view(command).substr(0, open)));
-  const auto arguments = split_arguments(std::string_view(command).substr(open + 1, command.size() - open - 2));
+  const auto arguments =
+      split_arguments(std::string_view(command).substr(open + 1, command.size() - open - 2));
   if (port_ == Port::kMotion && (name == "sync" || name == "syncall")) {
     syncs_.push_back({controller_.accepted_count(), controller_.dropped_count(), command});
     run();
     return {};
   }
-  const std::string result =
-      port_ == Port::kDashboard ? controller_.dashboard(name, arguments) : controller_.motion(name, arguments);
+  const std::string result = port_ == Port::kDashboard ? controller_.dashboard(name, arguments)
+                                                       : controller_.motion(name, arguments);
   return result + command + ";";
 }
 

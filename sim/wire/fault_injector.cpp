@@ -65,7 +65,8 @@ void FaultInjector::observe() {
   }
 }
 
-/// A device at rest gets no messages that its connection could be dropped at: by time alone, all are cut at once.
+/// A device at rest gets no messages that its connection could be dropped at: by time alone, all are cut at
+/// once.
 bool FaultInjector::cut_connections(const WireFault& fault) {
   const FaultTrigger& trigger = fault.trigger;
   if (fault.kind != WireFaultKind::kDroppedConnection || !trigger.at_s || trigger.at_message || trigger.phase)

@@ -7,8 +7,8 @@
 #include "sim/script/fault_script.h"
 #include "sim/wire/true_cell.h"
 
-/// Makes a fault script happen: it is called for every message and as time passes, decides what happens to an exchange,
-/// and acts on the cell. One thread, the cell's.
+/// Makes a fault script happen: it is called for every message and as time passes, decides what happens to an
+/// exchange, and acts on the cell. One thread, the cell's.
 namespace hilbrush {
 
 class FaultInjector {
@@ -22,7 +22,8 @@ class FaultInjector {
   void add(const WireFault& fault);
   /// Forgets what has not happened, ends what lasts.
   void clear();
-  /// The cell has come to its present time or changed: looks for phases that began, and faults that begin or end.
+  /// The cell has come to its present time or changed: looks for phases that began, and faults that begin or
+  /// end.
   void observe();
   /// What happens to the message that the device receives now; nothing: it is obeyed and answered.
   std::optional<WireFault> on_message(WireDevice device);
@@ -30,7 +31,8 @@ class FaultInjector {
   /// A serial line that is down.
   bool is_line_down(WireDevice device) const { return lasts(WireFaultKind::kDroppedConnection, device); }
   void set_line_down(WireDevice device, double duration_s);
-  /// How often all connections of the device were cut at once: sessions that began before the last time are over.
+  /// How often all connections of the device were cut at once: sessions that began before the last time are
+  /// over.
   std::uint64_t cut_count(WireDevice device) const { return cuts_[static_cast<std::size_t>(device)]; }
   double next_event_s() const;
   std::uint64_t begun_count() const { return begun_count_; }

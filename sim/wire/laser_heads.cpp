@@ -76,7 +76,8 @@ ObisLaser::Reply ObisLaser::obey(const std::string& header, const std::string& p
   if (header == "sour:pow:lev:imm:ampl") {
     double power = 0;
     const double low = cell_.description().laser.power_min_w;
-    if (!read_number(parameter, power) || power < low * (1 - 1e-6) || power > cell_.power_max_w() * (1 + 1e-6))
+    if (!read_number(parameter, power) || power < low * (1 - 1e-6) ||
+        power > cell_.power_max_w() * (1 + 1e-6))
       return {true, false, ""};
     cell_.set_power(power);
     return {};
@@ -97,7 +98,8 @@ ObisLaser::Reply ObisLaser::query(const std::string& header) const {
   if (header == "syst:inf:mod") return value("OBIS 405nm 100mW C");
   if (header == "syst:inf:snum") return value(std::to_string(kSerialNumber));
   if (header == "syst:inf:wav") return value("405");
-  if (header == "syst:inf:pow" || header == "sour:pow:nom") return watts(cell_.description().laser.power_max_w);
+  if (header == "syst:inf:pow" || header == "sour:pow:nom")
+    return watts(cell_.description().laser.power_max_w);
   if (header == "syst:inf:fver") return value("V1.0.2");
   if (header == "syst:comm:hand") return on_off(has_handshake_);
   if (header == "syst:cdrh") return on_off(has_start_delay_);
@@ -158,7 +160,8 @@ std::string CoboltLaser::answer_line(const std::string& line) {
   if (line == "p?") return value(fmt::format("{:.6f}", cell_.power_w()));
   if (line == "pa?") return value(fmt::format("{:.6f}", cell_.is_emitting() ? cell_.power_w() : 0));
   if (line == "glm?") return value("0405-06-01-0100-100");
-  if (line == "glp?" || line == "laser:cp:power:max?") return value(fmt::format("{:.4f}", cell_.power_max_w() * 1e3));
+  if (line == "glp?" || line == "laser:cp:power:max?")
+    return value(fmt::format("{:.4f}", cell_.power_max_w() * 1e3));
   if (line == "sn?" || line == "gsn?") return value(std::to_string(kSerialNumber));
   if (line == "gfv?") return value("50070");
   if (line == "hrs?") return value("12.5");
@@ -215,7 +218,8 @@ bool CoboltLaser::obey(const std::string& line) {
 
 bool CoboltLaser::set_power(const std::string& text, double unit_w) {
   double value = 0;
-  if (!read_number(text, value) || value < 0 || value * unit_w > cell_.power_max_w() * (1 + 1e-6)) return false;
+  if (!read_number(text, value) || value < 0 || value * unit_w > cell_.power_max_w() * (1 + 1e-6))
+    return false;
   cell_.set_power(value * unit_w);
   return true;
 }

@@ -20,8 +20,8 @@ class SerialLaser : public WireSession {
   virtual std::string answer_line(const std::string& line) = 0;
 };
 
-/// Coherent OBIS: SCPI. Commands are answered with OK or ERR only while the handshake is on; a query's value comes
-/// before its OK. Powers in watts.
+/// Coherent OBIS: SCPI. Commands are answered with OK or ERR only while the handshake is on; a query's value
+/// comes before its OK. Powers in watts.
 class ObisLaser final : public SerialLaser {
  public:
   using SerialLaser::SerialLaser;
@@ -48,7 +48,8 @@ class ObisLaser final : public SerialLaser {
   int error_count_ = 0;
 };
 
-/// Cobolt (Gen5/06): short commands of its own, some without an answer. Powers in W (p) or mW (the long ones, !p).
+/// Cobolt (Gen5/06): short commands of its own, some without an answer. Powers in W (p) or mW (the long ones,
+/// !p).
 class CoboltLaser final : public SerialLaser {
  public:
   using SerialLaser::SerialLaser;

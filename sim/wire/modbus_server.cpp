@@ -20,8 +20,8 @@ void put_word(std::string& bytes, std::uint16_t word) {
   bytes += static_cast<char>(word & 0xff);
 }
 
-/// Bytes of a request on a serial line, known from its head; 0 if more must come, npos for a function that is not
-/// supported.
+/// Bytes of a request on a serial line, known from its head; 0 if more must come, npos for a function that is
+/// not supported.
 std::size_t rtu_bytes(std::string_view buffer) {
   if (buffer.size() < 2) return 0;
   switch (byte_at(buffer, 1)) {
@@ -54,7 +54,8 @@ std::uint16_t modbus_crc(std::string_view bytes) {
   std::uint16_t crc = 0xffff;
   for (const char c : bytes) {
     crc = static_cast<std::uint16_t>(crc ^ static_cast<std::uint8_t>(c));
-    for (int bit = 0; bit < 8; ++bit) crc = static_cast<std::uint16_t>(crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1);
+    for (int bit = 0; bit < 8; ++bit)
+      crc = static_cast<std::uint16_t>(crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1);
   }
   return crc;
 }
@@ -76,7 +77,8 @@ std::size_t ModbusServer::message_bytes(std::string_view buffer) const {
 
 bool ModbusServer::parse(std::string_view message, Request& request) const {
   if (framing_ == Framing::kTcp) {
-    if (message.size() < kMbapBytes + 1 || word_at(message, 2) != 0 || message.size() != 6u + word_at(message, 4))
+    if (message.size() < kMbapBytes + 1 || word_at(message, 2) != 0 ||
+        message.size() != 6u + word_at(message, 4))
       return false;
     request = {word_at(message, 0), byte_at(message, 6), message.substr(kMbapBytes)};
     return true;
@@ -121,7 +123,8 @@ std::string ModbusServer::obey(RegisterBank& bank, std::string_view pdu) {
   const auto read = [&](std::uint16_t address, std::size_t count) -> std::string {
     if (count < 1 || count > kReadMax) return fail(ModbusOutcome::kIllegalValue);
     std::vector<std::uint16_t> values(count);
-    if (const auto outcome = bank.read(address, values); outcome != ModbusOutcome::kDone) return fail(outcome);
+    if (const auto outcome = bank.read(address, values); outcome != ModbusOutcome::kDone)
+      return fail(outcome);
     std::string reply{static_cast<char>(function), static_cast<char>(2 * count)};
     for (const std::uint16_t value : values) put_word(reply, value);
     return reply;
@@ -170,8 +173,8 @@ std::string ModbusServer::misaddressed(std::string answer) const {
   return answer;
 }
 
-/// RTU: the checksum no longer fits. TCP has none, and a damaged body would be the transport's fault: there it is the
-/// protocol identifier that is wrong.
+/// RTU: the checksum no longer fits. TCP has none, and a damaged body would be the transport's fault: there
+/// it is the protocol identifier that is wrong.
 std::string ModbusServer::damaged(std::string answer) const {
   const std::size_t place = framing_ == Framing::kTcp ? 2 : answer.size() - 1;
   if (answer.size() > place) answer[place] = static_cast<char>(answer[place] ^ 0x5A);

@@ -6,9 +6,10 @@
 
 #include "sim/wire/wire_session.h"
 
-/// The answering side of Modbus, as TCP (MBAP header) and as RTU (CRC-16), for units that are banks of registers.
-/// Functions 3 and 4 (read), 6 and 16 (write), 23 (write, then read). After the Modbus application protocol
-/// specification V1.1b3 and the serial line guide V1.02; written apart from anything that the drivers use.
+/// The answering side of Modbus, as TCP (MBAP header) and as RTU (CRC-16), for units that are banks of
+/// registers. Functions 3 and 4 (read), 6 and 16 (write), 23 (write, then read). After the Modbus application
+/// protocol specification V1.1b3 and the serial line guide V1.02; written apart from anything that the
+/// drivers use.
 namespace hilbrush {
 
 /// Zero is success; the others are the protocol's exception codes.

@@ -19,7 +19,8 @@ void TimeRecord::note_light(bool is_on, double now_s) {
   }
   if (dots_.size() >= kDotsMax) return;
   has_moved_ = false;
-  dots_.push_back({.light_on_s = now_s, .before_s = now_s - std::max({robot_shown_s_, table_shown_s_, dark_shown_s_})});
+  dots_.push_back(
+      {.light_on_s = now_s, .before_s = now_s - std::max({robot_shown_s_, table_shown_s_, dark_shown_s_})});
 }
 
 void TimeRecord::note_settled_shown(WireDevice device, double now_s) {

@@ -4,9 +4,9 @@
 
 #include "sim/script/fault_script.h"
 
-/// Whose time a dot takes: the devices' own, or what their controller adds. A device's own time ends with the first
-/// frame or reply that shows it at rest and settled (or, after a pulse, dark); the time from there until its next
-/// order was added. All times are the devices', on the cell's clock. One thread, the cell's.
+/// Whose time a dot takes: the devices' own, or what their controller adds. A device's own time ends with the
+/// first frame or reply that shows it at rest and settled (or, after a pulse, dark); the time from there
+/// until its next order was added. All times are the devices', on the cell's clock. One thread, the cell's.
 namespace hilbrush {
 
 class TimeRecord {

@@ -48,7 +48,8 @@ void TrueCell::move_axis(std::size_t index, double target, double speed_max, dou
   axis.target = target;
   if (axis.is_jammed) return;
   if (distance == 0 && now_s_ >= axis.motion.end_s()) return;
-  const double share = description.settle_saturation > 0 ? std::min(1., distance / description.settle_saturation) : 1;
+  const double share =
+      description.settle_saturation > 0 ? std::min(1., distance / description.settle_saturation) : 1;
   begin_motion(index, target, std::min(speed_max, description.speed_max),
                std::min(acceleration, description.acceleration_max), share);
 }
@@ -70,7 +71,8 @@ void TrueCell::move_chain(Chain chain, std::span<const double> target, double sp
   for (std::size_t i = 0; i < chain.count; ++i) {
     if (distance_of(i) == 0) continue;
     speed = std::min(speed, limits(chain.first + i).speed_max * speed_scale / distance_of(i));
-    acceleration = std::min(acceleration, limits(chain.first + i).acceleration_max * speed_scale / distance_of(i));
+    acceleration =
+        std::min(acceleration, limits(chain.first + i).acceleration_max * speed_scale / distance_of(i));
   }
   for (std::size_t i = 0; i < chain.count; ++i) {
     if (distance_of(i) == 0)
@@ -80,7 +82,8 @@ void TrueCell::move_chain(Chain chain, std::span<const double> target, double sp
   }
 }
 
-void TrueCell::begin_motion(std::size_t index, double target, double speed_max, double acceleration, double share) {
+void TrueCell::begin_motion(std::size_t index, double target, double speed_max, double acceleration,
+                            double share) {
   Axis& axis = axes_[index];
   // Light that is on while something begins to move is a fault, whichever was ordered first.
   if (emission_) emission_->is_moving = true;
@@ -144,7 +147,8 @@ bool TrueCell::is_moving(std::size_t index) const {
 bool TrueCell::is_settled(std::size_t index) const {
   constexpr double kRoundingS = 1e-9;
   const Axis& axis = axes_[index];
-  return !is_moving(index) && now_s_ >= axis.settled_s - kRoundingS && now_s_ < axis.off_since_s + options_.notice_s;
+  return !is_moving(index) && now_s_ >= axis.settled_s - kRoundingS &&
+         now_s_ < axis.off_since_s + options_.notice_s;
 }
 
 bool TrueCell::is_settled() const {
@@ -257,8 +261,10 @@ void TrueCell::set_power_max(double power_w) {
 }
 
 bool TrueCell::may_emit() const {
-  if (!is_ordered_ || !has_key_ || !is_interlock_closed_ || now_s_ < may_emit_s_ || is_warming_up()) return false;
-  return modulation_ == Modulation::kNone || (modulation_ == Modulation::kWired ? is_gate_open_ : is_serial_gate_open_);
+  if (!is_ordered_ || !has_key_ || !is_interlock_closed_ || now_s_ < may_emit_s_ || is_warming_up())
+    return false;
+  return modulation_ == Modulation::kNone ||
+         (modulation_ == Modulation::kWired ? is_gate_open_ : is_serial_gate_open_);
 }
 
 void TrueCell::update_light() {
@@ -267,7 +273,8 @@ void TrueCell::update_light() {
     return;
   }
   if (emission_) return;
-  emission_ = Emission{.joints = joints(), .start_s = now_s_, .power_w = power_w_, .is_moving = !is_settled()};
+  emission_ =
+      Emission{.joints = joints(), .start_s = now_s_, .power_w = power_w_, .is_moving = !is_settled()};
   if (times_) times_->note_light(true, now_s_);
   // Unbounded light has no commanded length: the longest pulse the cell allows stands for it.
   emission_->commanded_s = description_.laser.pulse_max_s;

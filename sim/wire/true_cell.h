@@ -10,13 +10,14 @@
 #include "sim/devices/emission_record.h"
 #include "sim/script/cell_phase.h"
 
-/// What the simulated cell truly is behind all its wires: six axes, one laser head with its gate, an interlock, and the
-/// record of emissions. Everything happens at a time that the caller gives, so the same cell runs on a scaled clock or
-/// in a test without any. Light is on exactly while the head may emit and its gate is open; each stretch of light is
-/// one emission.
+/// What the simulated cell truly is behind all its wires: six axes, one laser head with its gate, an
+/// interlock, and the record of emissions. Everything happens at a time that the caller gives, so the same
+/// cell runs on a scaled clock or in a test without any. Light is on exactly while the head may emit and its
+/// gate is open; each stretch of light is one emission.
 ///
-/// Axes come to rest by their trapezoidal profiles and then creep into place: the position error falls exponentially
-/// from kCreep x (share of the settle figures) until the mechanics have settled by the cell file's figures.
+/// Axes come to rest by their trapezoidal profiles and then creep into place: the position error falls
+/// exponentially from kCreep x (share of the settle figures) until the mechanics have settled by the cell
+/// file's figures.
 ///
 /// One thread. SI units: rad, m, s, W.
 namespace hilbrush {
@@ -37,11 +38,12 @@ class TrueCell {
 
   explicit TrueCell(const CellDescription& description, const TrueCellOptions& options = {});
 
-  /// Lets time pass: light that begins by itself (the end of the start delay) begins at its own instant. Times never
-  /// go back; a smaller one counts as the present.
+  /// Lets time pass: light that begins by itself (the end of the start delay) begins at its own instant.
+  /// Times never go back; a smaller one counts as the present.
   void advance(double now_s);
   double now_s() const { return now_s_; }
-  /// The next instant at which something happens by itself: an axis comes to rest or settles, the start delay ends.
+  /// The next instant at which something happens by itself: an axis comes to rest or settles, the start delay
+  /// ends.
   double next_event_s() const;
 
   // Axes. `scale` of speed and acceleration: 0..1.
@@ -70,7 +72,8 @@ class TrueCell {
   void displace_axis(std::size_t axis, double position);  ///< where it stands when power comes on
 
   // The laser head.
-  /// Light while emission is on; or only while the wired gate input, or the gate of the serial line, is open as well.
+  /// Light while emission is on; or only while the wired gate input, or the gate of the serial line, is open
+  /// as well.
   enum class Modulation { kNone, kWired, kSerial };
   void set_key(bool is_on);
   void set_interlock(bool is_closed);
@@ -78,7 +81,8 @@ class TrueCell {
   bool set_emission(bool is_on);
   void set_modulation(Modulation modulation);
   void set_power(double power_w);
-  /// The wired input of the gate. `pulse_s`: what the output's owner says the pulse will last from now, for the record.
+  /// The wired input of the gate. `pulse_s`: what the output's owner says the pulse will last from now, for
+  /// the record.
   void set_gate(bool is_open, std::optional<double> pulse_s = {});
   void set_serial_gate(bool is_open);
   bool has_key() const { return has_key_; }

@@ -23,7 +23,8 @@ namespace {
 constexpr std::size_t kConnectionsMax = 32;
 
 double checked_scale(double time_scale) {
-  if (!(time_scale > 0)) throw std::invalid_argument("a wire has no virtual time: the time scale must be above 0");
+  if (!(time_scale > 0))
+    throw std::invalid_argument("a wire has no virtual time: the time scale must be above 0");
   return time_scale;
 }
 
@@ -56,9 +57,9 @@ struct WireCell::Implementation {
 
     endpoints.is_gate_of_robot = options.laser == WireOptions::LaserHead::kObis;
     endpoints.laser_driver = endpoints.is_gate_of_robot ? "obis" : "cobolt";
-    endpoints.laser_port = options.is_laser_serial
-                               ? open_terminal(Conversation::kLaser)
-                               : "tcp://" + endpoints.host + ":" + std::to_string(listen(Conversation::kLaser));
+    endpoints.laser_port = options.is_laser_serial ? open_terminal(Conversation::kLaser)
+                                                   : "tcp://" + endpoints.host + ":" +
+                                                         std::to_string(listen(Conversation::kLaser));
   }
 
   std::uint16_t listen(Conversation about) {
@@ -68,7 +69,8 @@ struct WireCell::Implementation {
   std::string open_terminal(Conversation about) {
     PseudoTerminal terminal;
     slaves.push_back(std::move(terminal.slave));
-    connections.push_back(std::make_unique<Connection>(std::move(terminal.master), devices.converse(about), true));
+    connections.push_back(
+        std::make_unique<Connection>(std::move(terminal.master), devices.converse(about), true));
     return terminal.path;
   }
 
@@ -173,7 +175,8 @@ void WireCell::Implementation::take_callers(std::size_t first) {
     if (polled[first + i].revents == 0) continue;
     Descriptor caller = listeners[i].port.accept();
     if (!caller.is_open() || connections.size() >= kConnectionsMax) continue;
-    connections.push_back(std::make_unique<Connection>(std::move(caller), devices.converse(listeners[i].about), false));
+    connections.push_back(
+        std::make_unique<Connection>(std::move(caller), devices.converse(listeners[i].about), false));
   }
 }
 

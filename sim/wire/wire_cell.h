@@ -9,8 +9,8 @@
 #include "sim/wire/wire_options.h"
 
 /// The simulated cell on wires: device servers on TCP ports of this machine (chosen by the system) and
-/// pseudo-terminals, all in front of one TrueCell, on a clock that runs at a scale. A thread of its own serves them
-/// from construction to destruction. Its public functions may be called from any thread.
+/// pseudo-terminals, all in front of one TrueCell, on a clock that runs at a scale. A thread of its own
+/// serves them from construction to destruction. Its public functions may be called from any thread.
 namespace hilbrush {
 
 class WireCell {
@@ -26,7 +26,8 @@ class WireCell {
   double now_s() const;
   /// Called on the serving thread (or that of act()), which waits for it.
   void set_emission_sink(EmissionSink sink);
-  /// Acts on the cell at its present time: a turn of the key switch, an open interlock, a reading of the axes.
+  /// Acts on the cell at its present time: a turn of the key switch, an open interlock, a reading of the
+  /// axes.
   void act(const std::function<void(TrueCell&)>& action);
   void add_fault(const WireFault& fault);
   /// Ends all faults, also those that have not begun.

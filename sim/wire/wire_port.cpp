@@ -67,7 +67,8 @@ PseudoTerminal::PseudoTerminal() : master(::posix_openpt(O_RDWR | O_NOCTTY | O_N
   path = name.data();
   slave = Descriptor(::open(path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
   termios settings{};
-  if (!slave.is_open() || ::tcgetattr(slave.get(), &settings) != 0) fail("a pseudo-terminal for a simulated device");
+  if (!slave.is_open() || ::tcgetattr(slave.get(), &settings) != 0)
+    fail("a pseudo-terminal for a simulated device");
   ::cfmakeraw(&settings);
   if (::tcsetattr(slave.get(), TCSANOW, &settings) != 0) fail("a pseudo-terminal for a simulated device");
 }

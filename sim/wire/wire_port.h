@@ -38,8 +38,8 @@ class ListeningPort {
   std::uint16_t port_ = 0;
 };
 
-/// A pseudo-terminal in raw mode: we hold the master; the slave stays open, so that a client that closes it does not
-/// hang it up.
+/// A pseudo-terminal in raw mode: we hold the master; the slave stays open, so that a client that closes it
+/// does not hang it up.
 struct PseudoTerminal {
   PseudoTerminal();
   Descriptor master, slave;

@@ -6,9 +6,9 @@
 
 #include "sim/wire/fault_injector.h"
 
-/// One end of a conversation with a simulated device, without input or output: bytes in, bytes out, at the cell's
-/// present time. A protocol says where a message ends, obeys and answers it; faults of the exchange happen here, the
-/// same way for all of them. One thread, the cell's.
+/// One end of a conversation with a simulated device, without input or output: bytes in, bytes out, at the
+/// cell's present time. A protocol says where a message ends, obeys and answers it; faults of the exchange
+/// happen here, the same way for all of them. One thread, the cell's.
 namespace hilbrush {
 
 class WireSession {
@@ -34,7 +34,8 @@ class WireSession {
   WireDevice device() const { return device_; }
 
  protected:
-  /// Bytes of the first message in `buffer`, 0 if it is not whole. Bytes that begin no message are a message, too.
+  /// Bytes of the first message in `buffer`, 0 if it is not whole. Bytes that begin no message are a message,
+  /// too.
   virtual std::size_t message_bytes(std::string_view buffer) const = 0;
   /// Obeys, and says what is answered; empty: nothing.
   virtual std::string answer(std::string_view message) = 0;

@@ -7,8 +7,8 @@
 #include "sim/wire/modbus_server.h"
 #include "sim/wire/wire_options.h"
 
-/// The devices of the simulated cell with all that they share, without sockets and without a clock: the owner makes
-/// sessions for its connections and passes the time. One thread.
+/// The devices of the simulated cell with all that they share, without sockets and without a clock: the owner
+/// makes sessions for its connections and passes the time. One thread.
 namespace hilbrush {
 
 class WiredDevices {

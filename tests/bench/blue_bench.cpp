@@ -1,5 +1,6 @@
-// Blue noise in the plane and on a mesh: power at low frequencies, anisotropy, spacing, largest hole, discrepancy, path
-// and CPU seconds of `jittered`, `centroid` and `blue`, by the library's own measures (sampling/quality/quality.h).
+// Blue noise in the plane and on a mesh: power at low frequencies, anisotropy, spacing, largest hole,
+// discrepancy, path and CPU seconds of `jittered`, `centroid` and `blue`, by the library's own measures
+// (sampling/quality/quality.h).
 //   blue_bench [MODEL] [DOTS] [TRIANGLES]     MODEL is subdivided to that many triangles
 #include <cstdio>
 #include <cstdlib>
@@ -57,7 +58,8 @@ void run_in_plane(std::uint64_t count) {
     const Spectrum spectrum = plane_spectrum(points);
     const auto discrepancy = plane_discrepancies(points);
     std::printf(
-        "%-9s %6.3f s CPU  power %.4f (<fp/2) %.4f (<fp/4)  peak %.2f  anisotropy %.3f  spacing %.3f  hole %.3f  "
+        "%-9s %6.3f s CPU  power %.4f (<fp/2) %.4f (<fp/4)  peak %.2f  anisotropy %.3f  spacing %.3f  hole "
+        "%.3f  "
         "rms discrepancy %.2e %.2e %.2e  path %.3f\n",
         choice.name, seconds, spectrum.below_half, spectrum.below_quarter, spectrum.peak, spectrum.anisotropy,
         plane_spacing(points).smallest, plane_largest_hole(points), discrepancy[0].rms, discrepancy[1].rms,
@@ -84,7 +86,8 @@ void run_on_mesh(const std::string& file, std::uint64_t count, std::size_t trian
     const std::span<const Dot> set(dots.dots);
     const Spectrum spectrum = quality.spectrum(set);
     std::printf(
-        "%-9s %6.3f s CPU  power %.4f (<fp/2)  peak %.2f  spacing %.3f  hole %.3f  rms discrepancy of balls %.2e  "
+        "%-9s %6.3f s CPU  power %.4f (<fp/2)  peak %.2f  spacing %.3f  hole %.3f  rms discrepancy of balls "
+        "%.2e  "
         "path %.3f\n",
         choice.name, seconds, spectrum.below_half, spectrum.peak, quality.spacing(set).smallest,
         quality.largest_hole(set), quality.balls({&set, 1}).front().rms, quality.path_constant(set));

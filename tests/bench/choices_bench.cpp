@@ -1,5 +1,5 @@
-// The thesis's other choices, timed: curves and area methods on parametric surfaces, laminar slices and hole filling on
-// a model. Prints CPU seconds, what was measured, and an answer hash.
+// The thesis's other choices, timed: curves and area methods on parametric surfaces, laminar slices and hole
+// filling on a model. Prints CPU seconds, what was measured, and an answer hash.
 //   choices_bench [MODEL] [DOTS=1500000]
 
 #include <cmath>
@@ -34,7 +34,8 @@ void time_sphere(std::uint64_t count, AnswerHash& hash) {
   std::printf("sphere, %llu dots\ncurve    area method             leaves     area/4pi    path  CPU s\n",
               static_cast<unsigned long long>(count));
   for (const CurveKind curve : {CurveKind::kHilbert, CurveKind::kPeano2})
-    for (const AreaMethod method : {AreaMethod::kTriangle, AreaMethod::kSquare, AreaMethod::kFirstFundamentalForm})
+    for (const AreaMethod method :
+         {AreaMethod::kTriangle, AreaMethod::kSquare, AreaMethod::kFirstFundamentalForm})
       for (const Sampler sampler : {Sampler::kJittered, Sampler::kCentroid}) {
         ParametricOptions options;
         options.dot_count = count;
@@ -48,15 +49,18 @@ void time_sphere(std::uint64_t count, AnswerHash& hash) {
         const double path = path_length(samples.dots, [](const ParametricDot& dot) { return dot.position; }) /
                             std::sqrt(static_cast<double>(count) * 4 * std::numbers::pi);
         hash.take(path);
-        std::printf("%-8s %-22s %10llu %.9f %7.4f %6.2f  %s\n", curve == CurveKind::kHilbert ? "hilbert" : "peano2",
-                    name_of(kAreaMethodNames, method), static_cast<unsigned long long>(samples.vertex_count),
+        std::printf("%-8s %-22s %10llu %.9f %7.4f %6.2f  %s\n",
+                    curve == CurveKind::kHilbert ? "hilbert" : "peano2", name_of(kAreaMethodNames, method),
+                    static_cast<unsigned long long>(samples.vertex_count),
                     samples.area / (4 * std::numbers::pi), path, seconds,
                     sampler == Sampler::kCentroid ? "centroid" : "jittered");
       }
 }
 
 void time_model(const char* file, std::uint64_t count, AnswerHash& hash) {
-  const ImageReader no_images = [](const std::filesystem::path&, std::size_t) { return Failure{"not read here"}; };
+  const ImageReader no_images = [](const std::filesystem::path&, std::size_t) {
+    return Failure{"not read here"};
+  };
   PlacementOptions placement;
   placement.size_m = .08;
   const TexturedMesh mesh = repair_mesh(place_on_table(load_model(file, no_images), placement)).mesh;
@@ -84,8 +88,8 @@ void time_model(const char* file, std::uint64_t count, AnswerHash& hash) {
       const double after = path_length(all.dots, place);
       std::printf("%s, largest gap %.1f: %llu dots added (%llu by the sweep), path x %.4f, %.2f CPU s\n",
                   sampler == Sampler::kCentroid ? "centroid" : "jittered", gap,
-                  static_cast<unsigned long long>(filled.added), static_cast<unsigned long long>(filled.added_by_sweep),
-                  after / before, cpu_s() - start);
+                  static_cast<unsigned long long>(filled.added),
+                  static_cast<unsigned long long>(filled.added_by_sweep), after / before, cpu_s() - start);
       hash.take(after);
     }
 }

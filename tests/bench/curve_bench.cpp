@@ -1,10 +1,10 @@
-// Times the curve on a subdivided model: base tree, exact masses under a texture, and dots. Prints CPU and wall
-// seconds, patches, path constants, the worst mass of a stratum, memory, and an answer hash, which is the same for any
-// number of threads.
+// Times the curve on a subdivided model: base tree, exact masses under a texture, and dots. Prints CPU and
+// wall seconds, patches, path constants, the worst mass of a stratum, memory, and an answer hash, which is
+// the same for any number of threads.
 //   curve_bench MODEL [TRIANGLES=268000] [TEXELS=2048] [MOST_DOTS=10000000] [STREAMED_DOTS FILE]
 //   curve_bench --leaves FILE.png     patches on a line drawing, beside all of them at the finest depth
-// STREAMED_DOTS are written to FILE as binary PLY. A model without textures gets a picture of waves and lines by
-// projection.
+// STREAMED_DOTS are written to FILE as binary PLY. A model without textures gets a picture of waves and lines
+// by projection.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -48,7 +48,8 @@ Seconds time(int repeats, Work work) {
     const double cpu = cpu_s();
     work();
     best.cpu = std::min(best.cpu, cpu_s() - cpu);
-    best.wall = std::min(best.wall, std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
+    best.wall =
+        std::min(best.wall, std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count());
   }
   return best;
 }
@@ -127,14 +128,15 @@ double worst_stratum_error(const CurveMass& mass, const ToneField& tone, const S
   return worst;
 }
 
-void measure(const char* title, const SurfaceCurve& curve, const ToneOptions& tone_options, std::uint64_t most_dots,
-             std::size_t threads) {
+void measure(const char* title, const SurfaceCurve& curve, const ToneOptions& tone_options,
+             std::uint64_t most_dots, std::size_t threads) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   const TexturedMesh& mesh = curve.mesh();
   const ToneField tone(mesh, tone_options);
   const Seconds mass_s = time(kRepeats, [&] { CurveMass(curve, tone); });
   const CurveMass mass(curve, tone);
-  std::printf("\n%s, %zu thread(s): exact masses %.3f s CPU %.3f s wall\n", title, threads, mass_s.cpu, mass_s.wall);
+  std::printf("\n%s, %zu thread(s): exact masses %.3f s CPU %.3f s wall\n", title, threads, mass_s.cpu,
+              mass_s.wall);
   std::printf("      dots   CPU s  wall s  M dots/CPU s  patches/dot  path  worst mass  answer\n");
   for (std::uint64_t count = 10'000; count <= most_dots; count *= 10) {
     SampleOptions options;
@@ -149,11 +151,12 @@ void measure(const char* title, const SurfaceCurve& curve, const ToneOptions& to
       for (const Dot& dot : dots) hash.add(dot);
     });
     const bool is_checked = count <= kMaxChecked && threads == 1;
-    std::printf("%10llu %7.4f %7.4f %13.2f %12.2f %5.3f  %-10s  %016llx\n", static_cast<unsigned long long>(count),
-                s.cpu, s.wall, static_cast<double>(count) / s.cpu * 1e-6,
-                static_cast<double>(report.patch_count) / static_cast<double>(count), report.path_constant,
-                is_checked ? (std::to_string(1e6 * worst_stratum_error(mass, tone, options)) + "e-6").c_str() : "-",
-                static_cast<unsigned long long>(hash.value));
+    std::printf(
+        "%10llu %7.4f %7.4f %13.2f %12.2f %5.3f  %-10s  %016llx\n", static_cast<unsigned long long>(count),
+        s.cpu, s.wall, static_cast<double>(count) / s.cpu * 1e-6,
+        static_cast<double>(report.patch_count) / static_cast<double>(count), report.path_constant,
+        is_checked ? (std::to_string(1e6 * worst_stratum_error(mass, tone, options)) + "e-6").c_str() : "-",
+        static_cast<unsigned long long>(hash.value));
   }
 }
 
@@ -173,10 +176,12 @@ void print_tree(const TexturedMesh& mesh, const SurfaceCurve& curve, const Secon
     listed += chart.face_lists.size();
   }
   std::printf(
-      "%zu triangles, %zu components; mapped and divided in %.2f s CPU, %.2f s wall; of it the base tree %.3f s CPU\n",
+      "%zu triangles, %zu components; mapped and divided in %.2f s CPU, %.2f s wall; of it the base tree "
+      "%.3f s CPU\n",
       mesh.triangle_count(), curve.components().size(), map.cpu, map.wall, tree.cpu);
-  std::printf("base tree: %zu quads, %.2f quads a triangle; memory %.0f MB for the mesh, %.0f MB at most so far\n",
-              quads, static_cast<double>(listed) / static_cast<double>(mesh.triangle_count()), mesh_mb, peak_mb());
+  std::printf(
+      "base tree: %zu quads, %.2f quads a triangle; memory %.0f MB for the mesh, %.0f MB at most so far\n",
+      quads, static_cast<double>(listed) / static_cast<double>(mesh.triangle_count()), mesh_mb, peak_mb());
 }
 
 /// Streams dots into a file and prints the time and the memory that it takes.
@@ -222,7 +227,8 @@ TexturedMesh line_drawing(int texels) {
   TexturedMesh mesh = test::with_texture(
       test::rectangle(.05, .05, 4, 4), texels, texels,
       [texels](int i, int j) {
-        const bool is_line = std::abs(i - texels / 6) < 2 || std::abs(j - texels / 2) < 1 || std::abs(i - j) < 2 ||
+        const bool is_line = std::abs(i - texels / 6) < 2 || std::abs(j - texels / 2) < 1 ||
+                             std::abs(i - j) < 2 ||
                              std::abs(std::hypot(i - .6 * texels, j - .4 * texels) - .25 * texels) < 1.5;
         return is_line ? .05 : .6;
       },
@@ -276,9 +282,11 @@ void compare_leaves(const char* file) {
   const DotSequence same = place_dots(mass, options, &uniform);
   double apart = 0;
   for (std::size_t i = 0; i < kDots; ++i)
-    apart += (dots.dots[i].position_O - same.dots[i].position_O).norm() / dots.pitch_m / static_cast<double>(kDots);
+    apart += (dots.dots[i].position_O - same.dots[i].position_O).norm() / dots.pitch_m /
+             static_cast<double>(kDots);
   std::printf(
-      "%zu patches where the tone asks for them, %zu at depth %d all over (%.1f times): dots %.4f pitches apart\n",
+      "%zu patches where the tone asks for them, %zu at depth %d all over (%.1f times): dots %.4f pitches "
+      "apart\n",
       adaptive.patch_count, uniform.patch_count, *options.uniform_depth,
       static_cast<double>(uniform.patch_count) / static_cast<double>(adaptive.patch_count), apart);
   for (std::size_t depth = 0; depth < adaptive.patches_at_depth.size(); ++depth)

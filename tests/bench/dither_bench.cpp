@@ -1,6 +1,6 @@
 // Dithering in the plane at equal dot count: a picture on a flat rectangle through the real engine, against
-// Floyd-Steinberg and rows. Dots and picture are both blurred by one pitch (a dot blackens a pitch squared), edges left
-// out; PSNR in dB against black = 1.
+// Floyd-Steinberg and rows. Dots and picture are both blurred by one pitch (a dot blackens a pitch squared),
+// edges left out; PSNR in dB against black = 1.
 //   dither_bench [DOTS] [IMAGE...]
 #include <cstdio>
 #include <cstdlib>
@@ -109,7 +109,8 @@ class Print {
   double step_m() const { return pitch_ / 2; }
   Vector2d place(int x, int y) const { return {(x + .5) * step_m(), (y + .5) * step_m()}; }
 
-  /// The wanted picture at half a pitch, each value the mean of 4 x 4 samples, blurred along rows and then columns.
+  /// The wanted picture at half a pitch, each value the mean of 4 x 4 samples, blurred along rows and then
+  /// columns.
   void blur_wanted() {
     columns_ = static_cast<int>(width_ / step_m());
     rows_ = static_cast<int>(height_ / step_m());
@@ -216,7 +217,8 @@ void run(const Original& picture, std::uint64_t count) {
   const Print print(picture, count);
   const std::vector<Vector2d> diffused = floyd_steinberg(print), rows = raster(print);
   std::printf(
-      "%-16s random %5.1f  jittered %5.1f  rows %5.1f  Floyd-Steinberg %5.1f  centroid %5.1f  blue %5.1f  fine "
+      "%-16s random %5.1f  jittered %5.1f  rows %5.1f  Floyd-Steinberg %5.1f  centroid %5.1f  blue %5.1f  "
+      "fine "
       "%5.1f dB   (%llu dots; rows %zu, Floyd-Steinberg %zu)\n",
       picture.name.c_str(), print.psnr(print.placed(Sampler::kRandom, count)),
       print.psnr(print.placed(Sampler::kJittered, count)), print.psnr(rows), print.psnr(diffused),

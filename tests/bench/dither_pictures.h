@@ -26,7 +26,8 @@ struct Original {
 
 template <class Tone>
 Original picture_of(std::string name, int width, int height, Tone tone) {
-  Original picture{std::move(name), width, height, std::vector<float>(static_cast<std::size_t>(width) * height)};
+  Original picture{std::move(name), width, height,
+                   std::vector<float>(static_cast<std::size_t>(width) * height)};
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       picture.at(x, y) = static_cast<float>(std::clamp(tone((x + .5) / width, (y + .5) / height), 0., 1.));
@@ -47,8 +48,8 @@ inline Original zone_plate() {
 
 /// A pseudo-random number of a lattice point, 0..1.
 inline double lattice_number(int x, int y) {
-  return unit_interval(
-      mix_bits(static_cast<std::uint32_t>(x) * kGoldenGamma + static_cast<std::uint32_t>(y) * 0xBF58476D1CE4E5B9u));
+  return unit_interval(mix_bits(static_cast<std::uint32_t>(x) * kGoldenGamma +
+                                static_cast<std::uint32_t>(y) * 0xBF58476D1CE4E5B9u));
 }
 
 inline double smooth_noise(double x, double y) {
@@ -59,13 +60,15 @@ inline double smooth_noise(double x, double y) {
          g * ((1 - f) * lattice_number(i, j + 1) + f * lattice_number(i + 1, j + 1));
 }
 
-/// Like a photograph: 1/f texture everywhere, and lit balls with highlights and sharp outlines in front of it.
+/// Like a photograph: 1/f texture everywhere, and lit balls with highlights and sharp outlines in front of
+/// it.
 inline Original still_life() {
   return picture_of("still life", 640, 480, [](double u, double v) {
     const double x = 4 * u, y = 3 * v;
     double tone = .25;
     for (int octave = 0; octave < 6; ++octave)
-      tone += .5 * std::ldexp(1., -octave) * (smooth_noise(2 * std::ldexp(x, octave), 2 * std::ldexp(y, octave)) - .3);
+      tone += .5 * std::ldexp(1., -octave) *
+              (smooth_noise(2 * std::ldexp(x, octave), 2 * std::ldexp(y, octave)) - .3);
     constexpr std::array<std::array<double, 3>, 3> kBalls{{{1.1, 1.2, .75}, {2.5, 1.7, .9}, {3.3, .7, .45}}};
     for (const auto& [cx, cy, r] : kBalls) {
       const double dx = (x - cx) / r, dy = (y - cy) / r, d2 = dx * dx + dy * dy;
@@ -79,14 +82,15 @@ inline Original still_life() {
 
 /// Lines of capitals of three sizes, black on white, of 5 x 7 squares each.
 inline Original text() {
-  constexpr std::array<std::pair<char, std::array<std::uint8_t, 7>>, 8> kLetters{{{'H', {17, 17, 17, 31, 17, 17, 17}},
-                                                                                  {'I', {14, 4, 4, 4, 4, 4, 14}},
-                                                                                  {'L', {16, 16, 16, 16, 16, 16, 31}},
-                                                                                  {'B', {30, 17, 17, 30, 17, 17, 30}},
-                                                                                  {'R', {30, 17, 17, 30, 20, 18, 17}},
-                                                                                  {'U', {17, 17, 17, 17, 17, 17, 14}},
-                                                                                  {'S', {15, 16, 16, 14, 1, 1, 30}},
-                                                                                  {' ', {0, 0, 0, 0, 0, 0, 0}}}};
+  constexpr std::array<std::pair<char, std::array<std::uint8_t, 7>>, 8> kLetters{
+      {{'H', {17, 17, 17, 31, 17, 17, 17}},
+       {'I', {14, 4, 4, 4, 4, 4, 14}},
+       {'L', {16, 16, 16, 16, 16, 16, 31}},
+       {'B', {30, 17, 17, 30, 17, 17, 30}},
+       {'R', {30, 17, 17, 30, 20, 18, 17}},
+       {'U', {17, 17, 17, 17, 17, 17, 14}},
+       {'S', {15, 16, 16, 14, 1, 1, 30}},
+       {' ', {0, 0, 0, 0, 0, 0, 0}}}};
   constexpr std::string_view kWords = "HILBRUSH BRUSHIL RUSH ";
   Original picture{"text", 640, 480, std::vector<float>(640 * 480, 0)};
   int top = 470;

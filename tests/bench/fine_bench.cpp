@@ -1,5 +1,5 @@
-// What `fine` gains over `centroid` on the simulated film, at normal incidence and everywhere, for several numbers of
-// passes: fidelity, CPU seconds, path and how far dots moved.
+// What `fine` gains over `centroid` on the simulated film, at normal incidence and everywhere, for several
+// numbers of passes: fidelity, CPU seconds, path and how far dots moved.
 //   fine_bench MODEL SIZE_MM DPI [PASSES...]
 #include <algorithm>
 #include <cstdio>
@@ -26,8 +26,9 @@ SurfacePoint point_of(const TexturedMesh& mesh, const Dot& dot) {
   SurfacePoint point{dot.triangle, {}};
   for (int c = 0; c < 3; ++c) {
     const Eigen::Vector3d& from = mesh.corner(dot.triangle, (c + 1) % 3);
-    point.barycentric[c] = .5 * (mesh.corner(dot.triangle, (c + 2) % 3) - from).cross(dot.position_O - from).dot(area) /
-                           area.squaredNorm();
+    point.barycentric[c] =
+        .5 * (mesh.corner(dot.triangle, (c + 2) % 3) - from).cross(dot.position_O - from).dot(area) /
+        area.squaredNorm();
   }
   return point;
 }
@@ -54,17 +55,19 @@ void print_fidelity(const char* name, double seconds, const DotSequence& dots, c
   const FidelityFigures figures = measure_fidelity(film, tone, {}, 1).whole;
   std::sort(ways.begin(), ways.end());
   std::printf(
-      "%-10s %7.2f s CPU  F1 %.2f  F2 %.2f dB  S2 %.4f  tone rms %.4f max %.4f  P %.4f  path %.3f m  moved %.2f "
+      "%-10s %7.2f s CPU  F1 %.2f  F2 %.2f dB  S2 %.4f  tone rms %.4f max %.4f  P %.4f  path %.3f m  moved "
+      "%.2f "
       "(median) %.2f (most) pitches\n",
-      name, seconds, figures.f1_db, figures.f2_db, figures.s2, figures.tone_rms, figures.tone_max, figures.p999,
-      path_m(dots), ways[ways.size() / 2], ways.back());
+      name, seconds, figures.f1_db, figures.f2_db, figures.s2, figures.tone_rms, figures.tone_max,
+      figures.p999, path_m(dots), ways[ways.size() / 2], ways.back());
 }
 
 void run(const std::string& model_file, double size_mm, double dpi, const std::vector<int>& passes) {
   const CellDescription cell = load_cell(find_cell("default"));
   PlacementOptions placement;
   placement.size_m = size_mm * 1e-3;
-  const RepairedMesh repaired = repair_mesh(place_on_table(load_model(model_file, load_image_file), placement));
+  const RepairedMesh repaired =
+      repair_mesh(place_on_table(load_model(model_file, load_image_file), placement));
   const ToneField tone(repaired.mesh, cell_tone(cell, {.sampler = "centroid"}).options);
   const SurfaceCurve curve(repaired.mesh);
   SampleOptions options;
@@ -78,8 +81,8 @@ void run(const std::string& model_file, double size_mm, double dpi, const std::v
   for (const int count : passes) {
     start = cpu_s();
     const DotSequence fine = refine_dots(curve, tone, centroid, spot, {count});
-    print_fidelity(("fine " + std::to_string(count)).c_str(), cpu_s() - start, fine, centroid, repaired.mesh, cell,
-                   tone);
+    print_fidelity(("fine " + std::to_string(count)).c_str(), cpu_s() - start, fine, centroid, repaired.mesh,
+                   cell, tone);
   }
 }
 

@@ -1,11 +1,12 @@
-// Textures finer than a pitch: a 40 mm square under a picture that is repeated, and objects under a picture of 4096
-// texels a side, as a job paints them, with the tone curve alone.
+// Textures finer than a pitch: a 40 mm square under a picture that is repeated, and objects under a picture
+// of 4096 texels a side, as a job paints them, with the tone curve alone.
 //
-//   fine_texture_bench square DPI SETTINGS [texels]              three pictures, repeated 1, 3, 6 and 12 times
-//   fine_texture_bench object MODEL SIZE_MM DPI SETTINGS [texels]  and the same picture blurred by a pitch beforehand
+//   fine_texture_bench square DPI SETTINGS [texels]              three pictures, repeated 1, 3, 6 and 12
+//   times fine_texture_bench object MODEL SIZE_MM DPI SETTINGS [texels]  and the same picture blurred by a
+//   pitch beforehand
 //
-// SETTINGS are a job file's, such as {} or {"sampler":"blue"}. With `texels` the curve is applied to every texel, as it
-// was before it held for the mean over a pitch.
+// SETTINGS are a job file's, such as {} or {"sampler":"blue"}. With `texels` the curve is applied to every
+// texel, as it was before it held for the mean over a pitch.
 
 #include <cmath>
 #include <cstdio>
@@ -36,7 +37,8 @@ constexpr int kFineTexels = 4096, kRepeatsInFine = 32;
 constexpr std::array kRepeats{1, 3, 6, 12};
 
 Texture texture_of(const Original& picture) {
-  Texture texture{.width = picture.width, .height = picture.height, .luminance = {}, .opacity = {}, .name = ""};
+  Texture texture{
+      .width = picture.width, .height = picture.height, .luminance = {}, .opacity = {}, .name = ""};
   for (const float coverage : picture.coverage) texture.luminance.push_back(1 - coverage);
   return texture;
 }
@@ -87,8 +89,8 @@ double mean_error(const Film& film, const ToneField& tone) {
 }
 
 void print_header() {
-  std::printf("%-22s %3s %5s %8s %6s %6s %8s %8s %7s %7s %7s %6s  %s\n", "picture", "n", "dpi", "dots", "F1", "F2",
-              "tone rms", "tone max", "error", "field s", "dots s", "MB", "answer");
+  std::printf("%-22s %3s %5s %8s %6s %6s %8s %8s %7s %7s %7s %6s  %s\n", "picture", "n", "dpi", "dots", "F1",
+              "F2", "tone rms", "tone max", "error", "field s", "dots s", "MB", "answer");
 }
 
 void paint(const std::string& name, int repeats, const TexturedMesh& mesh, const JobSettings& settings,
@@ -111,16 +113,18 @@ void paint(const std::string& name, int repeats, const TexturedMesh& mesh, const
   Film film(mesh, cell, dots.pitch_m);
   expose_dots(film, dots);
   const FidelityFigures f = measure_fidelity(film, tone, {}, 1).whole;
-  std::printf("%-22s %3d %5.0f %8zu %6.2f %6.2f %8.4f %8.4f %7.4f %7.2f %7.2f %6.0f  %s\n", name.c_str(), repeats,
-              .0254 / dots.pitch_m, dots.dots.size(), f.f1_db, f.f2_db, f.tone_rms, f.tone_max, mean_error(film, tone),
-              made - begin, placed - walked, peak_mb(), hash.hex_digest().substr(0, 16).c_str());
+  std::printf("%-22s %3d %5.0f %8zu %6.2f %6.2f %8.4f %8.4f %7.4f %7.2f %7.2f %6.0f  %s\n", name.c_str(),
+              repeats, .0254 / dots.pitch_m, dots.dots.size(), f.f1_db, f.f2_db, f.tone_rms, f.tone_max,
+              mean_error(film, tone), made - begin, placed - walked, peak_mb(),
+              hash.hex_digest().substr(0, 16).c_str());
   std::fflush(stdout);
 }
 
 void paint_squares(const JobSettings& settings, bool is_by_texel) {
   print_header();
   for (const Original& picture : {bricks(), bench::still_life(), bench::text()})
-    for (const int repeats : kRepeats) paint(picture.name, repeats, square(picture, repeats), settings, is_by_texel);
+    for (const int repeats : kRepeats)
+      paint(picture.name, repeats, square(picture, repeats), settings, is_by_texel);
 }
 
 /// The picture over and over, kFineTexels a side.
@@ -201,7 +205,8 @@ int run(const std::vector<std::string>& arguments) {
     return 0;
   }
   if (arguments.size() >= 5 && arguments[0] == "object") {
-    paint_object(arguments[1], std::atof(arguments[2].c_str()), settings_of(arguments[4], arguments[3]), is_by_texel);
+    paint_object(arguments[1], std::atof(arguments[2].c_str()), settings_of(arguments[4], arguments[3]),
+                 is_by_texel);
     return 0;
   }
   std::fprintf(stderr,

@@ -1,7 +1,7 @@
 // Times the stages from a mesh to its maps on the square, and measures the maps.
 //   map_bench MODEL [TRIANGLES [DOTS [REPEATS]]]
-// TRIANGLES: the mesh is first subdivided to this many (0: unchanged). DOTS: dots of constant tone for the path
-// constant and the longest jumps (0: none).
+// TRIANGLES: the mesh is first subdivided to this many (0: unchanged). DOTS: dots of constant tone for the
+// path constant and the longest jumps (0: none).
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -67,11 +67,13 @@ struct Part {
 
 void print_part(const Part& part, std::size_t index, const ComponentReport& component, double pitch_m) {
   std::printf(
-      "  component %zu: %zu triangles, genus %d, %d loops, %s%s; %zu dots, path %.3f, longest jump %.1f, over 5: "
+      "  component %zu: %zu triangles, genus %d, %d loops, %s%s; %zu dots, path %.3f, longest jump %.1f, "
+      "over 5: "
       "%zu\n",
       index, component.triangle_count, component.genus, component.boundary_loops,
       component.is_mapped ? "mapped" : "in space: ", component.order_reason.c_str(), part.count,
-      part.path / std::sqrt(static_cast<double>(part.count) * component.area_m2), part.jump / pitch_m, part.long_jumps);
+      part.path / std::sqrt(static_cast<double>(part.count) * component.area_m2), part.jump / pitch_m,
+      part.long_jumps);
 }
 
 void print_dots(const TexturedMesh& mesh, const SurfaceCurve& curve, std::size_t count) {
@@ -101,7 +103,8 @@ void print_dots(const TexturedMesh& mesh, const SurfaceCurve& curve, std::size_t
               report.path_constant, between / report.path_length_m);
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < parts.size(); ++i) order.push_back(i);
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return parts[a].count > parts[b].count; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](auto a, auto b) { return parts[a].count > parts[b].count; });
   for (std::size_t k = 0; k < std::min<std::size_t>(order.size(), 6); ++k) {
     const Part& part = parts[order[k]];
     if (part.count < 10) break;
@@ -133,12 +136,15 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: map_bench MODEL [TRIANGLES [DOTS [REPEATS]]]\n");
     return 2;
   }
-  const auto number = [&](int i, long otherwise) { return i < argc ? std::max(0L, std::atol(argv[i])) : otherwise; };
+  const auto number = [&](int i, long otherwise) {
+    return i < argc ? std::max(0L, std::atol(argv[i])) : otherwise;
+  };
   try {
     const TexturedMesh mesh = read(argv[1], static_cast<std::size_t>(number(2, 0)));
     const long repeats = std::max(1L, number(4, 1));
     Stages stages;
-    for (long i = 0; i < repeats; ++i) run(mesh, static_cast<std::size_t>(number(3, 0)), stages, i + 1 == repeats);
+    for (long i = 0; i < repeats; ++i)
+      run(mesh, static_cast<std::size_t>(number(3, 0)), stages, i + 1 == repeats);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "map_bench: %s\n", error.what());
     return 1;

@@ -1,5 +1,5 @@
-// Our square map against CGAL's mean-value square map (GPL: only here), on the same cut mesh, best of several in the
-// same run, CPU seconds.
+// Our square map against CGAL's mean-value square map (GPL: only here), on the same cut mesh, best of several
+// in the same run, CPU seconds.
 //   map_rival_bench MODEL [TRIANGLES [REPEATS]]
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Simple_cartesian.h>
@@ -42,18 +42,21 @@ RivalMesh rival_mesh(const Disk& disk) {
   RivalMesh mesh;
   for (const auto& p : disk.positions()) mesh.add_vertex({p.x(), p.y(), p.z()});
   for (const Triangle& f : disk.faces())
-    mesh.add_face(RivalMesh::Vertex_index(f[0]), RivalMesh::Vertex_index(f[1]), RivalMesh::Vertex_index(f[2]));
+    mesh.add_face(RivalMesh::Vertex_index(f[0]), RivalMesh::Vertex_index(f[1]),
+                  RivalMesh::Vertex_index(f[2]));
   return mesh;
 }
 
 double rival_seconds(RivalMesh mesh) {
   const double begin = cpu_s();
   using Border = parameterization::Square_border_arc_length_parameterizer_3<RivalMesh>;
-  auto uv = mesh.add_property_map<RivalMesh::Vertex_index, CGAL::Simple_cartesian<double>::Point_2>("v:uv").first;
+  auto uv =
+      mesh.add_property_map<RivalMesh::Vertex_index, CGAL::Simple_cartesian<double>::Point_2>("v:uv").first;
   const auto halfedge = CGAL::Polygon_mesh_processing::longest_border(mesh).first;
   const auto result = parameterization::parameterize(
       mesh, parameterization::Mean_value_coordinates_parameterizer_3<RivalMesh, Border>(), halfedge, uv);
-  if (result != parameterization::OK) std::fprintf(stderr, "CGAL: %s\n", parameterization::get_error_message(result));
+  if (result != parameterization::OK)
+    std::fprintf(stderr, "CGAL: %s\n", parameterization::get_error_message(result));
   return cpu_s() - begin;
 }
 
@@ -87,9 +90,11 @@ int main(int argc, char** argv) {
       faces = cut->disk.faces().size();
       shear = map->shear;
     }
-    std::printf("%zu triangles, %zu faces of the cut disk, shear %.3f\n", mesh.triangle_count(), faces, shear);
-    std::printf("ours, cut and map %.3f CPU s (cut %.3f); CGAL, map of the same disk %.3f CPU s; ratio %.3f\n", ours,
-                ours_cut, rival, ours / rival);
+    std::printf("%zu triangles, %zu faces of the cut disk, shear %.3f\n", mesh.triangle_count(), faces,
+                shear);
+    std::printf(
+        "ours, cut and map %.3f CPU s (cut %.3f); CGAL, map of the same disk %.3f CPU s; ratio %.3f\n", ours,
+        ours_cut, rival, ours / rival);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "map_rival_bench: %s\n", error.what());
     return 1;

@@ -1,8 +1,8 @@
-// How near lens and quill come to object, post and plate on the legs of a program, for every way in which the cell's
-// controllers may lead their joints: each joint on its own or all together, the arm or the table late.
+// How near lens and quill come to object, post and plate on the legs of a program, for every way in which the
+// cell's controllers may lead their joints: each joint on its own or all together, the arm or the table late.
 //   motion_bench PROGRAM.ply MODEL SIZE_MM [LATE_MS]
-// Distances are found by the check's own geometry: a lens and a quill that are wider, longer or thinner until they
-// just touch; between steps the lens travels half a millimeter at most.
+// Distances are found by the check's own geometry: a lens and a quill that are wider, longer or thinner until
+// they just touch; between steps the lens travels half a millimeter at most.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -27,7 +27,8 @@ using namespace hilbrush;
 using testing_support::LegLaw;
 
 constexpr double kStepM = .5e-3;
-/// Gaps that are tried, widest first, mm; a negative one is a thinner lens, which touches what is that deep in it.
+/// Gaps that are tried, widest first, mm; a negative one is a thinner lens, which touches what is that deep
+/// in it.
 constexpr double kGapsMm[] = {.3, 0, -1, -2, -4, -8};
 
 /// The cell with a lens and a quill that keep this gap to the true ones.
@@ -114,7 +115,8 @@ void report(const CellDescription& cell, const Gaps& gaps, const std::vector<Leg
     for (std::size_t gap = touched_on(cell, gaps, leg, law); gap > 0; --gap) ++not_kept[gap - 1];
   std::printf("| robot %s, table %s, robot %+.0f ms late, table %+.0f |",
               law.is_robot_coordinated ? "coordinated" : "independent",
-              law.is_table_coordinated ? "coordinated" : "independent", law.robot_late_s * 1e3, law.table_late_s * 1e3);
+              law.is_table_coordinated ? "coordinated" : "independent", law.robot_late_s * 1e3,
+              law.table_late_s * 1e3);
   for (std::size_t gap = 0; gap < std::size(kGapsMm); ++gap) std::printf(" %zu |", not_kept[gap]);
   std::printf("\n");
 }
@@ -139,7 +141,8 @@ int main(int argc, char** argv) {
   std::erase_if(legs, [&](const Leg& leg) { return is_short(gaps, leg); });
   std::printf("%zu exposures, %zu way-points, %.1f s; %zu of %zu legs looked at\n", program.exposures.size(),
               program.vias.size(), estimate_time(cell, program).total_s(), legs.size(), all);
-  std::printf("| law | legs nearer than .3 mm | touching | 1 mm deep | 2 | 4 | 8 |\n|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| law | legs nearer than .3 mm | touching | 1 mm deep | 2 | 4 | 8 |\n|---|---|---|---|---|---|---|\n");
   for (const bool robot : {false, true})
     for (const bool table : {false, true})
       for (const double late : {0., -late_s, -late_s / 2, late_s / 2, late_s})

@@ -1,7 +1,8 @@
 // Painted pictures: the fidelity F1 and F2 of simulated films.
 //
 //   painted_bench table MODEL SIZE_MM DPI...                 the fidelity of each method of placing dots
-//   painted_bench figures EGGCUP FOLDER                      figures 7.11 and 7.13 to 7.16 of the thesis: laminar
+//   painted_bench figures EGGCUP FOLDER                      figures 7.11 and 7.13 to 7.16 of the thesis:
+//   laminar
 //                                                            slices beside our dots
 //   painted_bench run MODEL SIZE_MM DPI [loop|plain]         one run, with its time and memory
 //
@@ -51,7 +52,8 @@ constexpr std::array kWays{Way{"random", R"({"sampler":"random"})"},
 /// A mesh with its curve and cell; `place` does the same as a job's pipeline.
 class Workpiece {
  public:
-  Workpiece(TexturedMesh mesh, CellDescription cell) : mesh_(std::move(mesh)), cell_(std::move(cell)), curve_(mesh_) {}
+  Workpiece(TexturedMesh mesh, CellDescription cell)
+      : mesh_(std::move(mesh)), cell_(std::move(cell)), curve_(mesh_) {}
 
   struct Painted {
     std::size_t dot_count = 0;
@@ -66,7 +68,8 @@ class Workpiece {
     JobSettings settings = job_settings_from_json(way.settings);
     settings.dpi = dpi;
     const double pitch_m = .0254 / dpi;
-    const std::string sampler = settings.sampler == Sampler::kFine ? "centroid" : sampler_name(settings.sampler);
+    const std::string sampler =
+        settings.sampler == Sampler::kFine ? "centroid" : sampler_name(settings.sampler);
     CellTone tone = cell_tone(cell_, {.sampler = sampler,
                                       .curve = curve_name(settings.curve),
                                       .levels = settings.levels,
@@ -93,7 +96,8 @@ class Workpiece {
     painted.dot_count = dots.dots.size();
     Sha256 hash;
     for (const Dot& dot : dots.dots)
-      hash.update(std::span(reinterpret_cast<const std::uint8_t*>(dot.position_O.data()), 3 * sizeof(double)));
+      hash.update(
+          std::span(reinterpret_cast<const std::uint8_t*>(dot.position_O.data()), 3 * sizeof(double)));
     painted.answer = hash.hex_digest().substr(0, 16);
     painted.film.emplace(mesh_, cell_, dots.pitch_m);
     expose_dots(*painted.film, dots);
@@ -108,14 +112,15 @@ class Workpiece {
 };
 
 void print_header() {
-  std::printf("%-28s %6s %9s %6s %6s %6s %8s %8s %7s %7s  %s\n", "what", "dpi", "dots", "F1", "F2", "S2", "tone rms",
-              "tone max", "CPU s", "MB", "answer");
+  std::printf("%-28s %6s %9s %6s %6s %6s %8s %8s %7s %7s  %s\n", "what", "dpi", "dots", "F1", "F2", "S2",
+              "tone rms", "tone max", "CPU s", "MB", "answer");
 }
 
 void print(const std::string& what, double dpi, const Workpiece::Painted& painted) {
   const FidelityFigures& f = painted.fidelity.whole;
-  std::printf("%-28s %6.0f %9zu %6.2f %6.2f %6.3f %8.4f %8.4f %7.1f %7.0f  %s\n", what.c_str(), dpi, painted.dot_count,
-              f.f1_db, f.f2_db, f.s2, f.tone_rms, f.tone_max, painted.cpu, peak_mb(), painted.answer.c_str());
+  std::printf("%-28s %6.0f %9zu %6.2f %6.2f %6.3f %8.4f %8.4f %7.1f %7.0f  %s\n", what.c_str(), dpi,
+              painted.dot_count, f.f1_db, f.f2_db, f.s2, f.tone_rms, f.tone_max, painted.cpu, peak_mb(),
+              painted.answer.c_str());
   std::fflush(stdout);
 }
 
@@ -149,7 +154,8 @@ Texture texture_of(int width, int height, const std::function<double(double, dou
 
 /// Ten fields from light to dark (figure 7.15).
 TexturedMesh gray_wedge() {
-  return card(.100, .020, texture_of(1000, 200, [](double u, double) { return std::floor(u * 10) / 10 + .05; }));
+  return card(.100, .020,
+              texture_of(1000, 200, [](double u, double) { return std::floor(u * 10) / 10 + .05; }));
 }
 
 /// A slight gradient with a picture in the middle (figure 7.13): here rings.
@@ -160,13 +166,14 @@ TexturedMesh gradient_with_rings() {
               }));
 }
 
-/// The cup's own surface under another tone: even (figures 7.11 and 7.14), or horizontal bands as wide as the gaps
-/// between them (figure 7.16).
+/// The cup's own surface under another tone: even (figures 7.11 and 7.14), or horizontal bands as wide as the
+/// gaps between them (figure 7.16).
 TexturedMesh cup_with(const TexturedMesh& cup, const std::function<double(double)>& coverage_of_height) {
   TexturedMesh mesh = cup;
   double low = 1, high = -1;
   for (const auto& vertex : mesh.vertices) low = std::min(low, vertex.z()), high = std::max(high, vertex.z());
-  mesh.textures = {texture_of(4, 2048, [&](double, double v) { return coverage_of_height(low + v * (high - low)); })};
+  mesh.textures = {
+      texture_of(4, 2048, [&](double, double v) { return coverage_of_height(low + v * (high - low)); })};
   mesh.materials = {
       {.name = "bands", .source = ColorSource::kTexture, .texture = 0, .repeat_u = false, .repeat_v = false}};
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
@@ -179,7 +186,8 @@ TexturedMesh cup_with(const TexturedMesh& cup, const std::function<double(double
 
 /// What the paint shows, as one view from the front sees it.
 Picture photograph(const Film& film, double pixel_m) {
-  const OrthographicView view(film.mesh(), {"front", Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()}, pixel_m);
+  const OrthographicView view(film.mesh(), {"front", Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()},
+                              pixel_m);
   Picture picture{view.width(), view.height(), 1, {}};
   std::vector<OrthographicView::Pixel> row;
   for (int y = 0; y < view.height(); ++y) {
@@ -221,7 +229,8 @@ void paint_figure(const std::string& name, const TexturedMesh& mesh, double dpi,
   save_png(beside(pictures[0], pictures[1]), folder / (name + ".png"));
 }
 
-void paint_figures(const std::string& eggcup, const std::filesystem::path& folder, const CellDescription& cell) {
+void paint_figures(const std::string& eggcup, const std::filesystem::path& folder,
+                   const CellDescription& cell) {
   std::filesystem::create_directories(folder);
   const TexturedMesh cup = load(eggcup, 60);
   const auto stripes = [](double z) { return std::fmod(z, .004) < .002 ? .9 : .0; };

@@ -1,5 +1,5 @@
-// Our samplers against Open3D's Poisson-disk sampler (sample elimination after Yuksel 2015) on one mesh: CPU seconds,
-// rms discrepancy of balls in space, smallest spacing, largest hole.
+// Our samplers against Open3D's Poisson-disk sampler (sample elimination after Yuksel 2015) on one mesh: CPU
+// seconds, rms discrepancy of balls in space, smallest spacing, largest hole.
 //   peers_rival_bench MODEL [DOTS] [TRIANGLES]     MODEL is subdivided to that many triangles
 #include <open3d/Open3D.h>
 
@@ -31,9 +31,9 @@ TexturedMesh black_mesh(const std::string& file, std::size_t triangles) {
 }
 
 void print(const char* name, double seconds, std::span<const Dot> dots, const SurfaceQuality& quality) {
-  std::printf("%-18s %8.3f s CPU  rms discrepancy of balls %.2e  spacing %.3f  hole %.3f  dots %zu\n", name, seconds,
-              quality.balls({&dots, 1}).front().rms, quality.spacing(dots).smallest, quality.largest_hole(dots),
-              dots.size());
+  std::printf("%-18s %8.3f s CPU  rms discrepancy of balls %.2e  spacing %.3f  hole %.3f  dots %zu\n", name,
+              seconds, quality.balls({&dots, 1}).front().rms, quality.spacing(dots).smallest,
+              quality.largest_hole(dots), dots.size());
 }
 
 double run_ours(const char* name, Sampler sampler, std::uint64_t count, const SurfaceCurve& curve,
@@ -89,7 +89,8 @@ int main(int argc, char** argv) {
     const SurfaceCurve curve(mesh);
     const double set_up = cpu_s() - start;
     const SurfaceQuality quality(mesh);
-    std::printf("%zu triangles; our cut, map and base tree, once a mesh: %.3f s CPU\n", mesh.triangle_count(), set_up);
+    std::printf("%zu triangles; our cut, map and base tree, once a mesh: %.3f s CPU\n", mesh.triangle_count(),
+                set_up);
     const double centroid = run_ours("centroid", Sampler::kCentroid, count, curve, tone, quality);
     const double blue = run_ours("blue", Sampler::kBlue, count, curve, tone, quality);
     const double theirs = run_open3d(count, mesh, quality);

@@ -1,5 +1,5 @@
-// Times the stages from a model to a checked program and prints a hash of the answer, which is the same for any number
-// of threads.
+// Times the stages from a model to a checked program and prints a hash of the answer, which is the same for
+// any number of threads.
 //   pipeline_bench MODEL SIZE_MM DPI [REPEATS]
 #include <algorithm>
 #include <chrono>
@@ -35,7 +35,8 @@ class Stopwatch {
     auto result = work();
     Seconds& best = best_[stage];
     const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count();
-    if (best.wall == 0 || wall_s < best.wall) best = {wall_s, static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC};
+    if (best.wall == 0 || wall_s < best.wall)
+      best = {wall_s, static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC};
     return result;
   }
   void print() const {
@@ -53,8 +54,10 @@ class Stopwatch {
 std::string answer_hash(const ExposureProgram& program) {
   Sha256 hash;
   for (const Exposure& exposure : program.exposures) {
-    hash.update(std::span(reinterpret_cast<const std::uint8_t*>(exposure.joints.data()), sizeof exposure.joints));
-    hash.update(std::span(reinterpret_cast<const std::uint8_t*>(exposure.position_O.data()), 3 * sizeof(double)));
+    hash.update(
+        std::span(reinterpret_cast<const std::uint8_t*>(exposure.joints.data()), sizeof exposure.joints));
+    hash.update(
+        std::span(reinterpret_cast<const std::uint8_t*>(exposure.position_O.data()), 3 * sizeof(double)));
   }
   return hash.hex_digest().substr(0, 16);
 }
@@ -68,13 +71,15 @@ void run(const std::string& model_file, double size_mm, double dpi, Stopwatch& w
   placement.size_m = size_mm * 1e-3;
 
   const Model model = watch.time("load", [&] { return load_model(model_file, load_image_file); });
-  const RepairedMesh repaired = watch.time("repair", [&] { return repair_mesh(place_on_table(model, placement)); });
+  const RepairedMesh repaired =
+      watch.time("repair", [&] { return repair_mesh(place_on_table(model, placement)); });
   const ToneField tone(repaired.mesh, cell_tone(cell, {.sampler = sampler_name(settings.sampler)}).options);
   const SurfaceCurve curve = watch.time("curve", [&] { return SurfaceCurve(repaired.mesh); });
   SampleReport report;
   const DotSequence dots =
       watch.time("dots", [&] { return place_dots(curve, tone, sample_options(settings), &report); });
-  const auto reach = watch.time("reach", [&] { return std::make_unique<Reach>(repaired.mesh, cell, options); });
+  const auto reach =
+      watch.time("reach", [&] { return std::make_unique<Reach>(repaired.mesh, cell, options); });
   const Plan plan = watch.time("plan", [&] { return plan_exposures(*reach, dots); });
   const auto faults = watch.time(
       "check", [&] { return check_program(plan.program, plan.skipped, dots, repaired.mesh, cell, options); });
@@ -82,7 +87,8 @@ void run(const std::string& model_file, double size_mm, double dpi, Stopwatch& w
 
   watch.print();
   std::printf(
-      "triangles %zu, dots %zu, exposed %zu, patches %zu, path constant %.3f, painting time %.0f s, faults %zu\n",
+      "triangles %zu, dots %zu, exposed %zu, patches %zu, path constant %.3f, painting time %.0f s, faults "
+      "%zu\n",
       repaired.mesh.triangle_count(), dots.dots.size(), plan.program.exposures.size(), report.patch_count,
       report.path_constant, plan.time.total_s(), faults.size());
   std::printf("answer %s\n", answer_hash(plan.program).c_str());
@@ -98,7 +104,8 @@ int main(int argc, char** argv) {
   const int repeats = std::max(1, argc > 4 ? std::atoi(argv[4]) : 3);
   Stopwatch watch;
   try {
-    for (int i = 0; i < repeats; ++i) run(argv[1], std::atof(argv[2]), std::atof(argv[3]), watch, i + 1 == repeats);
+    for (int i = 0; i < repeats; ++i)
+      run(argv[1], std::atof(argv[2]), std::atof(argv[3]), watch, i + 1 == repeats);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "pipeline_bench: %s\n", error.what());
     return 1;

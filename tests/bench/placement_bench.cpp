@@ -1,10 +1,10 @@
-// The quality of `centroid` and `blue` beside the thesis's `jittered`, in the plane and on meshes, and the limits set
-// for them.
+// The quality of `centroid` and `blue` beside the thesis's `jittered`, in the plane and on meshes, and the
+// limits set for them.
 //   placement_bench [--count N] [--shapes L] [--seeds S] [MESH...]
 // On a plate (the unit square), on a sphere of 8,000 triangles, and on each mesh, all black. Lengths are over
-// sqrt(A / N); power is the mean below half the principal frequency. Ratios are to jittered on the same surface with
-// the same test shapes. One set's anisotropy scatters, so its mean over S seeds is given too. A hash of all figures is
-// printed at the end.
+// sqrt(A / N); power is the mean below half the principal frequency. Ratios are to jittered on the same
+// surface with the same test shapes. One set's anisotropy scatters, so its mean over S seeds is given too. A
+// hash of all figures is printed at the end.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -57,7 +57,8 @@ TexturedMesh plate() {
 }
 TexturedMesh sphere() {
   return grid_mesh(90, 45, [](double u, double v) {
-    const double turn = u == 1 ? 0 : 2 * kPi * u, polar = kPi * v;  // the seam's two sides are the same to the last bit
+    const double turn = u == 1 ? 0 : 2 * kPi * u,
+                 polar = kPi * v;  // the seam's two sides are the same to the last bit
     const double r = v == 0 || v == 1 ? 0 : std::sin(polar);
     return Vector3d(r * std::cos(turn), r * std::sin(turn), -std::cos(polar));
   });
@@ -67,12 +68,14 @@ TexturedMesh black_model(const std::string& file) {
   placement.size_m = .1;
   TexturedMesh mesh = repair_mesh(place_on_table(load_model(file, load_image_file), placement)).mesh;
   for (auto& luminance : mesh.corner_luminance) luminance = {0, 0, 0};
-  for (Material& material : mesh.materials) material = {material.name, ColorSource::kColors, -1, true, true, 1};
+  for (Material& material : mesh.materials)
+    material = {material.name, ColorSource::kColors, -1, true, true, 1};
   return mesh;
 }
 
 struct Row {
-  double balls = 0, sets = 0, power = 0, spacing = 0, spread = 0, hole = 0, path = 0, anisotropy = 0, cpu_s = 0;
+  double balls = 0, sets = 0, power = 0, spacing = 0, spread = 0, hole = 0, path = 0, anisotropy = 0,
+         cpu_s = 0;
 };
 
 class Bench {
@@ -83,17 +86,19 @@ class Bench {
     const ToneField tone(mesh, {});
     const SurfaceCurve curve(mesh);
     const SurfaceQuality quality(mesh);
-    std::printf("\n%s: %zu triangles, %llu dots\n%-12s %8s %6s %8s %6s %8s %8s %8s %8s %8s %8s %8s\n", name.c_str(),
-                mesh.triangle_count(), static_cast<unsigned long long>(count_), "", "balls", "ratio", "sets", "ratio",
-                "power", "aniso", "spacing", "spread", "hole", "path", "CPU s");
+    std::printf("\n%s: %zu triangles, %llu dots\n%-12s %8s %6s %8s %6s %8s %8s %8s %8s %8s %8s %8s\n",
+                name.c_str(), mesh.triangle_count(), static_cast<unsigned long long>(count_), "", "balls",
+                "ratio", "sets", "ratio", "power", "aniso", "spacing", "spread", "hole", "path", "CPU s");
     Row jittered;
     for (const Sampler sampler : {Sampler::kJittered, Sampler::kCentroid, Sampler::kBlue}) {
       const Row row = measure(curve, tone, quality, sampler, is_plane);
       if (sampler == Sampler::kJittered) jittered = row;
-      std::printf("%-12s %8.2e %6.3f %8.2e %6.3f %8.4f %8.3f %8.3f %8.3f %8.3f %8.3f %8.3f\n", sampler_name(sampler),
-                  row.balls, row.balls / jittered.balls, row.sets, row.sets / jittered.sets, row.power, row.anisotropy,
-                  row.spacing, row.spread, row.hole, row.path, row.cpu_s);
-      for (const double figure : {row.balls, row.sets, row.power, row.anisotropy, row.spacing, row.hole, row.path})
+      std::printf("%-12s %8.2e %6.3f %8.2e %6.3f %8.4f %8.3f %8.3f %8.3f %8.3f %8.3f %8.3f\n",
+                  sampler_name(sampler), row.balls, row.balls / jittered.balls, row.sets,
+                  row.sets / jittered.sets, row.power, row.anisotropy, row.spacing, row.spread, row.hole,
+                  row.path, row.cpu_s);
+      for (const double figure :
+           {row.balls, row.sets, row.power, row.anisotropy, row.spacing, row.hole, row.path})
         hash_.take(figure);
       std::fflush(stdout);
     }
@@ -112,14 +117,16 @@ class Bench {
         options.sampler = sampler;
         options.seed = seed;
         std::vector<Eigen::Vector2d> points;
-        for (const Dot& dot : place_dots(curve, tone, options).dots) points.emplace_back(dot.position_O.head<2>());
+        for (const Dot& dot : place_dots(curve, tone, options).dots)
+          points.emplace_back(dot.position_O.head<2>());
         const double anisotropy = plane_spectrum(points).anisotropy;
         hash_.take(anisotropy);
         sum += anisotropy;
         square_sum += anisotropy * anisotropy;
       }
       const double n = static_cast<double>(seed_count), mean = sum / n;
-      std::printf("  %s %.3f %.3f", sampler_name(sampler), mean, std::sqrt(std::max(0., square_sum / n - mean * mean)));
+      std::printf("  %s %.3f %.3f", sampler_name(sampler), mean,
+                  std::sqrt(std::max(0., square_sum / n - mean * mean)));
       std::fflush(stdout);
     }
     std::printf("\n");
@@ -127,8 +134,8 @@ class Bench {
   unsigned long long hash() const { return hash_.value(); }
 
  private:
-  Row measure(const SurfaceCurve& curve, const ToneField& tone, const SurfaceQuality& quality, Sampler sampler,
-              bool is_plane) const {
+  Row measure(const SurfaceCurve& curve, const ToneField& tone, const SurfaceQuality& quality,
+              Sampler sampler, bool is_plane) const {
     SampleOptions options;
     options.dot_count = count_;
     options.sampler = sampler;
@@ -186,7 +193,8 @@ int main(int argc, char** argv) {
   try {
     Bench bench(count, shapes);
     std::printf(
-        "Limits: centroid: balls ratio <= .75 on meshes, power <= .06, path <= 1.0, hole <= 1.08; blue: power <= "
+        "Limits: centroid: balls ratio <= .75 on meshes, power <= .06, path <= 1.0, hole <= 1.08; blue: "
+        "power <= "
         ".02, spacing >= .5,\nhole <= 1.0, anisotropy not above jittered's. In the plane `balls` are quarter "
         "circles and `sets` triangles.\n");
     bench.surface("plane", plate(), true);

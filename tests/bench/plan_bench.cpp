@@ -1,13 +1,13 @@
-// Painting time, incidence and planning cost of the baselines and of every planning mode, for the same number of dots
-// and by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program passes the same
-// check.
+// Painting time, incidence and planning cost of the baselines and of every planning mode, for the same number
+// of dots and by the same code: dots differ by sampler and curve, plans by PlanOptions, and every program
+// passes the same check.
 //   plan_bench [--confirm N] MODEL SIZE_MM DOTS [ROW...]
 //       rows: laminar space curve thesis fast balanced quality; all unless named. N of
 //       the skipped dots of each row are tried by brute force on a grid of poses one degree apart.
 //   plan_bench --trade MODEL SIZE_MM DOTS
 //       painting time over incidence, by preferred incidence and planning
-// Floor: the least possible painting time, as each exposure takes the shortest settling, its pulse and a move of one
-// control tick. The shares of steps that take one, two or more ticks show what exceeds it.
+// Floor: the least possible painting time, as each exposure takes the shortest settling, its pulse and a move
+// of one control tick. The shares of steps that take one, two or more ticks show what exceeds it.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -45,7 +45,8 @@ struct Row {
   Sampler sampler;
   CurveKind curve;
   PlanOptions options;
-  bool is_in_space = false;  ///< dots in the order of a Hilbert curve through space instead of the surface's own
+  bool is_in_space =
+      false;  ///< dots in the order of a Hilbert curve through space instead of the surface's own
 };
 
 const std::vector<Row>& rows() {
@@ -67,7 +68,8 @@ std::uint64_t place_in_space(const Eigen::Vector3d& p) {
   constexpr int kLevels = 10;
   std::array<std::uint32_t, 3> x;
   for (std::size_t i = 0; i < 3; ++i)
-    x[i] = static_cast<std::uint32_t>(std::clamp(p[static_cast<Eigen::Index>(i)], 0., .999999) * (1 << kLevels));
+    x[i] =
+        static_cast<std::uint32_t>(std::clamp(p[static_cast<Eigen::Index>(i)], 0., .999999) * (1 << kLevels));
   for (std::uint32_t q = 1U << (kLevels - 1); q > 1; q >>= 1)
     for (std::size_t i = 0; i < 3; ++i) {
       if (x[i] & q) {
@@ -94,7 +96,8 @@ void sort_in_space(DotSequence& dots) {
   for (const Dot& dot : dots.dots) box.extend(dot.position_O);
   const double size_m = box.sizes().maxCoeff();
   std::stable_sort(dots.dots.begin(), dots.dots.end(), [&](const Dot& a, const Dot& b) {
-    return place_in_space((a.position_O - box.min()) / size_m) < place_in_space((b.position_O - box.min()) / size_m);
+    return place_in_space((a.position_O - box.min()) / size_m) <
+           place_in_space((b.position_O - box.min()) / size_m);
   });
 }
 
@@ -140,7 +143,8 @@ Incidence incidence_of(const ExposureProgram& program) {
   if (all.empty()) return {};
   std::sort(all.begin(), all.end());
   return {sum / static_cast<double>(all.size()) / kDegree,
-          static_cast<double>(all[(all.size() - 1) * 95 / 100]) / kDegree, static_cast<double>(all.back()) / kDegree};
+          static_cast<double>(all[(all.size() - 1) * 95 / 100]) / kDegree,
+          static_cast<double>(all.back()) / kDegree};
 }
 
 struct Steps {
@@ -200,13 +204,16 @@ void Bench::run(const Row& row, std::uint64_t count) const {
   const Steps steps = steps_of(cell, plan.program);
   const Incidence incidence = incidence_of(plan.program);
   std::printf(
-      "%-9s %8zu %7zu %9.0f %9.0f %6.2f | %6.0f %6.0f %6.0f %6.0f | %4.0f %4.0f %4.0f | %5.1f %5.1f %5.1f | %6zu %6zu "
+      "%-9s %8zu %7zu %9.0f %9.0f %6.2f | %6.0f %6.0f %6.0f %6.0f | %4.0f %4.0f %4.0f | %5.1f %5.1f %5.1f | "
+      "%6zu %6zu "
       "| %7.2f %7.2f %6.0f %4zu %016llx\n",
-      row.name, dot_sequence.dots.size(), plan.skipped.size(), plan.time.total_s(), least_time_s(cell, plan.program),
-      1e3 * plan.time.total_s() / static_cast<double>(std::max<std::size_t>(1, plan.program.exposures.size())),
-      plan.time.move_s, plan.time.settle_s, plan.time.expose_s, plan.time.retract_s, steps.percent(0), steps.percent(1),
-      steps.percent(2), incidence.mean, incidence.p95, incidence.max, steps.table_moves, plan.program.vias.size(),
-      plan_cpu_s, wall_s, peak_mb(), faults.size(), hash.value());
+      row.name, dot_sequence.dots.size(), plan.skipped.size(), plan.time.total_s(),
+      least_time_s(cell, plan.program),
+      1e3 * plan.time.total_s() /
+          static_cast<double>(std::max<std::size_t>(1, plan.program.exposures.size())),
+      plan.time.move_s, plan.time.settle_s, plan.time.expose_s, plan.time.retract_s, steps.percent(0),
+      steps.percent(1), steps.percent(2), incidence.mean, incidence.p95, incidence.max, steps.table_moves,
+      plan.program.vias.size(), plan_cpu_s, wall_s, peak_mb(), faults.size(), hash.value());
   for (std::size_t i = 0; i < std::min<std::size_t>(faults.size(), 3); ++i)
     std::printf("  fault at %zu: %s\n", faults[i].exposure, faults[i].what.c_str());
   explain_skipped(plan, dot_sequence, reach);
@@ -214,9 +221,11 @@ void Bench::run(const Row& row, std::uint64_t count) const {
 }
 
 void print_heads() {
-  std::printf("%-9s %8s %7s %9s %9s %6s | %6s %6s %6s %6s | %4s %4s %4s | %5s %5s %5s | %6s %6s | %7s %7s %6s %4s %s\n",
-              "row", "dots", "skipped", "painting", "floor", "ms/dot", "move", "settle", "expose", "retrct", "1t%",
-              "2t%", "3t%", "mean", "p95", "max", "table", "vias", "CPU s", "wall s", "MB", "bad", "answer");
+  std::printf(
+      "%-9s %8s %7s %9s %9s %6s | %6s %6s %6s %6s | %4s %4s %4s | %5s %5s %5s | %6s %6s | %7s %7s %6s %4s "
+      "%s\n",
+      "row", "dots", "skipped", "painting", "floor", "ms/dot", "move", "settle", "expose", "retrct", "1t%",
+      "2t%", "3t%", "mean", "p95", "max", "table", "vias", "CPU s", "wall s", "MB", "bad", "answer");
 }
 
 void trade(const Bench& bench, std::uint64_t count) {
@@ -255,7 +264,8 @@ int main(int argc, char** argv) {
       return 0;
     }
     for (const Row& row : rows())
-      if (wanted.empty() || std::find(wanted.begin(), wanted.end(), row.name) != wanted.end()) bench.run(row, count);
+      if (wanted.empty() || std::find(wanted.begin(), wanted.end(), row.name) != wanted.end())
+        bench.run(row, count);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "plan_bench: %s\n", error.what());
     return 1;

@@ -1,10 +1,11 @@
-// How fast poses are solved and tested for clearance, how well the distance field agrees with rays, and whether dots
-// that are out of reach really are.
+// How fast poses are solved and tested for clearance, how well the distance field agrees with rays, and
+// whether dots that are out of reach really are.
 //   reach_bench [--poses N] [--dots N] [--brute N] MODEL SIZE_MM [MODEL SIZE_MM...]
-// For each model: solutions of the whole chain per second; poses per second with everything checked (beam, lens,
-// joints, quill, links), each by itself, and along directions as `Reach` searches; the distance field against a bundle
-// of rays; the share of N dots everywhere on the surface that is reached; and how many of N skipped dots a fine grid of
-// poses reaches after all. CPU seconds of one thread. A hash of all counts is printed at the end.
+// For each model: solutions of the whole chain per second; poses per second with everything checked (beam,
+// lens, joints, quill, links), each by itself, and along directions as `Reach` searches; the distance field
+// against a bundle of rays; the share of N dots everywhere on the surface that is reached; and how many of N
+// skipped dots a fine grid of poses reaches after all. CPU seconds of one thread. A hash of all counts is
+// printed at the end.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -52,7 +53,8 @@ std::vector<Target> scatter_targets(const TexturedMesh& mesh, std::size_t count,
   for (std::size_t i = 0; i < count; ++i) {
     const double at = sum * (static_cast<double>(i) + uniform(random)) / static_cast<double>(count);
     const auto t = std::min<std::size_t>(
-        static_cast<std::size_t>(std::lower_bound(sums.begin(), sums.end(), at) - sums.begin()), sums.size() - 1);
+        static_cast<std::size_t>(std::lower_bound(sums.begin(), sums.end(), at) - sums.begin()),
+        sums.size() - 1);
     double v = uniform(random), w = uniform(random);
     if (v + w > 1) {
       v = 1 - v;
@@ -75,8 +77,8 @@ Vector3d beam_in_cone(const Vector3d& normal, double angle_max, std::mt19937& ra
 
 void measure_solutions(const Reach& reach, const Amounts& amounts, std::mt19937& random) {
   const auto& kinematics = reach.kinematics();
-  std::uniform_real_distribution<double> tilt(kinematics.axis_min(kTilt), kinematics.axis_max(kTilt)), turn(-kPi, kPi),
-      side(-.03, .03);
+  std::uniform_real_distribution<double> tilt(kinematics.axis_min(kTilt), kinematics.axis_max(kTilt)),
+      turn(-kPi, kPi), side(-.03, .03);
   struct Wish {
     TablePose table;
     Vector3d p_O;
@@ -84,15 +86,16 @@ void measure_solutions(const Reach& reach, const Amounts& amounts, std::mt19937&
   };
   std::vector<Wish> wishes(4096);
   for (Wish& wish : wishes)
-    wish = {
-        kinematics.table_pose(tilt(random), turn(random)), {side(random), side(random), side(random)}, turn(random)};
+    wish = {kinematics.table_pose(tilt(random), turn(random)),
+            {side(random), side(random), side(random)},
+            turn(random)};
   std::size_t solved = 0;
   const double begin = seconds();
   for (std::size_t i = 0; i < amounts.poses; ++i) {
     const Wish& wish = wishes[i % wishes.size()];
     Joints joints;
-    solved +=
-        kinematics.solve_arm(wish.table.to_W(wish.p_O), wish.yaw, i & 1 ? Elbow::kPositive : Elbow::kNegative, joints);
+    solved += kinematics.solve_arm(wish.table.to_W(wish.p_O), wish.yaw,
+                                   i & 1 ? Elbow::kPositive : Elbow::kNegative, joints);
   }
   const double spent = seconds() - begin;
   std::printf("inverse kinematics       %8.2f M/s (%.1f %% within the arm's annulus)\n",
@@ -110,7 +113,8 @@ void measure_single_poses(const Reach& reach, const std::vector<Target>& targets
     Vector3d beam_O;
   };
   std::vector<Wish> wishes;
-  std::uniform_real_distribution<double> tilt(reach.kinematics().axis_min(kTilt), reach.kinematics().axis_max(kTilt));
+  std::uniform_real_distribution<double> tilt(reach.kinematics().axis_min(kTilt),
+                                              reach.kinematics().axis_max(kTilt));
   while (wishes.size() < 200'000) {
     const Target& target = targets[wishes.size() % targets.size()];
     const Vector3d beam_O = beam_in_cone(target.face_normal_O, kPi / 4, random);
@@ -118,7 +122,8 @@ void measure_single_poses(const Reach& reach, const std::vector<Target>& targets
     const double a = tilt(random);
     const TableSolutions solutions = solve_table(reach.kinematics(), a, beam_O);
     if (solutions.empty()) continue;
-    wishes.push_back({&target, reach.kinematics().table_pose(a, solutions[0].rotation), solutions[0].yaw, beam_O});
+    wishes.push_back(
+        {&target, reach.kinematics().table_pose(a, solutions[0].rotation), solutions[0].yaw, beam_O});
   }
   const Joints home{};
   std::size_t clear = 0;
@@ -131,7 +136,8 @@ void measure_single_poses(const Reach& reach, const std::vector<Target>& targets
              reach.clearance().beam_obstruction(wish.target->position_O, wish.beam_O) == Obstruction::kNone;
   }
   const double spent = seconds() - begin;
-  std::printf("poses, each by itself    %8.2f M/s (%.1f %% clear)\n", 1e-6 * static_cast<double>(amounts.poses) / spent,
+  std::printf("poses, each by itself    %8.2f M/s (%.1f %% clear)\n",
+              1e-6 * static_cast<double>(amounts.poses) / spent,
               100. * static_cast<double>(clear) / static_cast<double>(amounts.poses));
   hash.take(static_cast<double>(clear));
 }
@@ -145,8 +151,9 @@ void measure_directions(const Reach& reach, const std::vector<Target>& targets, 
   for (std::size_t d = 0; poses < amounts.poses; ++d) {
     const Target& target = targets[d % targets.size()];
     const Vector3d beam_O = beam_in_cone(target.face_normal_O, kPi / 4, random);
-    const bool is_free = reach.clearance().beam_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
-                         reach.clearance().lens_obstruction(target.position_O, beam_O) == Obstruction::kNone;
+    const bool is_free =
+        reach.clearance().beam_obstruction(target.position_O, beam_O) == Obstruction::kNone &&
+        reach.clearance().lens_obstruction(target.position_O, beam_O) == Obstruction::kNone;
     for (const double tilt : reach.tilts()) {
       const TableSolutions solutions = solve_table(reach.kinematics(), tilt, beam_O);
       poses += 2 * solutions.size();
@@ -159,7 +166,8 @@ void measure_directions(const Reach& reach, const std::vector<Target>& targets, 
     }
   }
   const double spent = seconds() - begin;
-  std::printf("poses, by directions     %8.2f M/s (%.1f %% clear)\n", 1e-6 * static_cast<double>(poses) / spent,
+  std::printf("poses, by directions     %8.2f M/s (%.1f %% clear)\n",
+              1e-6 * static_cast<double>(poses) / spent,
               100. * static_cast<double>(clear) / static_cast<double>(poses));
   hash.take(static_cast<double>(clear));
 }
@@ -179,14 +187,16 @@ void compare_with_rays(const Reach& reach, const TexturedMesh& mesh, const std::
     cautious += !is_clear && !reference.lens_touches(target.position_O, beam_O, Clearance::kMarginM);
   }
   const double share = 100. / static_cast<double>(count);
-  std::printf("field against rays       misses %.3f %%, over-cautious beyond the margin %.2f %% (%.1f %% touch)\n",
-              share * static_cast<double>(misses), share * static_cast<double>(cautious),
-              share * static_cast<double>(touching));
+  std::printf(
+      "field against rays       misses %.3f %%, over-cautious beyond the margin %.2f %% (%.1f %% touch)\n",
+      share * static_cast<double>(misses), share * static_cast<double>(cautious),
+      share * static_cast<double>(touching));
   hash.take(static_cast<double>(misses));
   hash.take(static_cast<double>(cautious));
 }
 
-void survey(const Reach& reach, const std::vector<Target>& targets, const Amounts& amounts, AnswerHash& hash) {
+void survey(const Reach& reach, const std::vector<Target>& targets, const Amounts& amounts,
+            AnswerHash& hash) {
   std::vector<std::size_t> skipped;
   std::map<std::string, std::size_t> reasons;
   const Joints home{};
@@ -205,7 +215,8 @@ void survey(const Reach& reach, const std::vector<Target>& targets, const Amount
   hash.take(static_cast<double>(skipped.size()));
 
   std::size_t confirmed = 0, looked = 0, poses = 0;
-  const std::size_t stride = std::max<std::size_t>(1, skipped.size() / std::max<std::size_t>(1, amounts.brute));
+  const std::size_t stride =
+      std::max<std::size_t>(1, skipped.size() / std::max<std::size_t>(1, amounts.brute));
   for (std::size_t s = 0; s < skipped.size() && looked < amounts.brute; s += stride, ++looked) {
     const PoseGridAnswer answer = search_pose_grid(reach, targets[skipped[s]], 2 * kPi / 180);
     poses += answer.poses;
@@ -215,8 +226,8 @@ void survey(const Reach& reach, const std::vector<Target>& targets, const Amount
       std::printf("  reached after all: %s\n", why.detail.c_str());
     }
   }
-  std::printf("brute force              %zu of %zu skipped dots confirmed, %.0f poses each\n", confirmed, looked,
-              looked > 0 ? static_cast<double>(poses) / static_cast<double>(looked) : 0.);
+  std::printf("brute force              %zu of %zu skipped dots confirmed, %.0f poses each\n", confirmed,
+              looked, looked > 0 ? static_cast<double>(poses) / static_cast<double>(looked) : 0.);
   hash.take(static_cast<double>(confirmed));
 }
 
@@ -250,7 +261,8 @@ int main(int argc, char** argv) {
     (flag == "--poses" ? amounts.poses : flag == "--dots" ? amounts.dots : amounts.brute) = amount;
   }
   if (i + 1 >= argc) {
-    std::fprintf(stderr, "usage: reach_bench [--poses N] [--dots N] [--brute N] MODEL SIZE_MM [MODEL SIZE_MM...]\n");
+    std::fprintf(stderr,
+                 "usage: reach_bench [--poses N] [--dots N] [--brute N] MODEL SIZE_MM [MODEL SIZE_MM...]\n");
     return 2;
   }
   try {

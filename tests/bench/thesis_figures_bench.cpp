@@ -1,4 +1,5 @@
-// Figures of the thesis as pictures (SVG): 5.13 to 5.20, 6.5 and 7.4; where they hold numbers, those are printed too.
+// Figures of the thesis as pictures (SVG): 5.13 to 5.20, 6.5 and 7.4; where they hold numbers, those are
+// printed too.
 //   thesis_figures_bench FOLDER [--powers L] [MESH...]
 // Meshes are for figure 6.5, on sets of up to 1.5 * 2^L dots (default L: 17).
 #include <algorithm>
@@ -40,7 +41,8 @@ struct Output {
   }
 };
 
-ParametricOptions options_of(std::uint64_t count, ParametricDensity density, Sampler sampler = Sampler::kJittered) {
+ParametricOptions options_of(std::uint64_t count, ParametricDensity density,
+                             Sampler sampler = Sampler::kJittered) {
   ParametricOptions options;
   options.dot_count = count;
   options.density = density;
@@ -157,7 +159,8 @@ void figure_of_spectrum(Output& output, const std::string& file, const std::stri
             0.,
             std::max(2., std::min(mean.peak * 1.05, 6.)),
             {{"", {}, PlotSeries::Style::kLine}}};
-  for (const Spectrum::Ring& ring : mean.rings) plot.series[0].points.emplace_back(ring.frequency, ring.power);
+  for (const Spectrum::Ring& ring : mean.rings)
+    plot.series[0].points.emplace_back(ring.frequency, ring.power);
   output.write(file, svg_of(plot));
 }
 
@@ -170,12 +173,15 @@ void figures_of_spectra(Output& output) {
       return plane_points(options);
     };
   };
-  const auto rival = [](PlaneSet set) { return [set](std::uint64_t seed) { return plane_set(set, kCount, seed); }; };
+  const auto rival = [](PlaneSet set) {
+    return [set](std::uint64_t seed) { return plane_set(set, kCount, seed); };
+  };
   figure_of_spectrum(output, "figure_5_17.svg", "random", 10, rival(PlaneSet::kRandom));
   figure_of_spectrum(output, "figure_5_18.svg", "Hilbert, jittered", 10, on_curve(Sampler::kJittered));
   figure_of_spectrum(output, "figure_5_19.svg", "Niederreiter", 1, rival(PlaneSet::kNiederreiter));
   figure_of_spectrum(output, "figure_5_20.svg", "Hammersley", 1, rival(PlaneSet::kHammersley));
-  figure_of_spectrum(output, "figure_5_18_centroid.svg", "Hilbert, centroid", 1, on_curve(Sampler::kCentroid));
+  figure_of_spectrum(output, "figure_5_18_centroid.svg", "Hilbert, centroid", 1,
+                     on_curve(Sampler::kCentroid));
 }
 
 /// A black surface and its curve, which keep references to each other and never move.
@@ -196,7 +202,8 @@ struct BlackSurface {
 
 TexturedMesh black(TexturedMesh mesh) {
   for (auto& luminance : mesh.corner_luminance) luminance = {0, 0, 0};
-  for (Material& material : mesh.materials) material = {material.name, ColorSource::kColors, -1, true, true, 1};
+  for (Material& material : mesh.materials)
+    material = {material.name, ColorSource::kColors, -1, true, true, 1};
   return mesh;
 }
 
@@ -206,10 +213,12 @@ void figure_6_5(Output& output, const std::vector<std::string>& files, int power
   for (const std::string& file : files) {
     PlacementOptions placement;
     placement.size_m = .1;
-    const BlackSurface surface(black(repair_mesh(place_on_table(load_model(file, load_image_file), placement)).mesh));
+    const BlackSurface surface(
+        black(repair_mesh(place_on_table(load_model(file, load_image_file), placement)).mesh));
     const SurfaceQuality quality(surface.mesh);
     for (const Sampler sampler : {Sampler::kJittered, Sampler::kRandom}) {
-      if (sampler == Sampler::kRandom && !control.points.empty()) continue;  // alike on every mesh: shown once
+      if (sampler == Sampler::kRandom && !control.points.empty())
+        continue;  // alike on every mesh: shown once
       std::vector<DotSequence> sequences;
       for (int l = 1; l <= powers; ++l)
         for (const std::uint64_t count : {std::uint64_t{2} << (l - 1), std::uint64_t{3} << (l - 1)})
@@ -222,7 +231,8 @@ void figure_6_5(Output& output, const std::vector<std::string>& files, int power
         series.points.emplace_back(static_cast<double>(sets[i].size()), found[i].largest);
         output.hash.take(found[i].largest);
       }
-      (sampler == Sampler::kRandom ? control.points : plot.series.emplace_back(series).points) = series.points;
+      (sampler == Sampler::kRandom ? control.points : plot.series.emplace_back(series).points) =
+          series.points;
     }
   }
   plot.series.push_back(control);
@@ -271,11 +281,12 @@ void figure_7_4(Output& output) {
       PointPicture{"(a) 3,000 random", plane_set(PlaneSet::kRandom, 3000, 1), kRadius, {}},
       PointPicture{"(b) 3,000 Niederreiter", plane_set(PlaneSet::kNiederreiter, 3000, 1), kRadius, {}},
       PointPicture{"(c) 3,000 Hilbert, jittered", flat(square.place(3000, Sampler::kJittered)), kRadius, {}},
-      PointPicture{"(d) " + std::to_string(filled.dots.size()) + " with holes filled", flat(filled), kRadius, {}}};
+      PointPicture{
+          "(d) " + std::to_string(filled.dots.size()) + " with holes filled", flat(filled), kRadius, {}}};
   for (const PointPicture& picture : pictures) {
     const double bare = uncovered(picture.points, kRadius);
-    std::printf("figure 7.4 %-32s %5zu dots leave %.3f %% bare\n", picture.title.c_str(), picture.points.size(),
-                100 * bare);
+    std::printf("figure 7.4 %-32s %5zu dots leave %.3f %% bare\n", picture.title.c_str(),
+                picture.points.size(), 100 * bare);
     output.hash.take(bare);
   }
   output.write("figure_7_4.svg", svg_of(pictures, "Splats of radius 0.02"));
@@ -287,7 +298,8 @@ void run(Output& output, const std::vector<std::string>& meshes, int powers) {
   for (const View& view :
        {View{ParametricShape::kMonkeySaddle, "Monkey saddle", "figure_5_14.svg", 3000, 30, 40, false, false},
         View{ParametricShape::kEightSurface, "Eight surface", "figure_5_15.svg", 10'000, 20, 15, true, false},
-        View{ParametricShape::kWhitneyUmbrella, "Whitney umbrella", "figure_5_16.svg", 6000, 60, 25, false, true}})
+        View{ParametricShape::kWhitneyUmbrella, "Whitney umbrella", "figure_5_16.svg", 6000, 60, 25, false,
+             true}})
     SurfaceFigure(view).write(output);
   figures_of_spectra(output);
   figure_7_4(output);

@@ -1,9 +1,9 @@
 // The thesis's discrepancy slopes beside our own: tables 5.1, 5.2, 5.3, 5.4 and, with meshes given, 6.1.
 //   thesis_tables_bench [--powers L] [--out FOLDER] [MESH...]
 // Sets of 2^l and 2^l + 2^(l-1) points, l = 1..L (default 20: up to 1,572,864), 1000 test shapes each, as
-// sections 5.1.1 and 6.2.1 say. The thesis's slopes are of the largest error; those of the rms error, which are
-// steadier, are printed beside them. Prints a hash of all figures at the end. With --out, plots of all sets
-// (figures 5.2 to 5.7, 5.9 to 5.12 and 6.5) are written into the folder.
+// sections 5.1.1 and 6.2.1 say. The thesis's slopes are of the largest error; those of the rms error, which
+// are steadier, are printed beside them. Prints a hash of all figures at the end. With --out, plots of all
+// sets (figures 5.2 to 5.7, 5.9 to 5.12 and 6.5) are written into the folder.
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -55,10 +55,12 @@ struct Curve {
 };
 
 void print_head(const char* title) {
-  std::printf("\n%s\n%-38s %8s %8s %8s %8s %12s\n", title, "", "thesis", "here", "off by", "rms", "rms at 49152");
+  std::printf("\n%s\n%-38s %8s %8s %8s %8s %12s\n", title, "", "thesis", "here", "off by", "rms",
+              "rms at 49152");
 }
 
-void print_and_plot(Run& run, const std::string& title, const std::string& file, const std::vector<Curve>& curves) {
+void print_and_plot(Run& run, const std::string& title, const std::string& file,
+                    const std::vector<Curve>& curves) {
   Plot plot{title, "points", "largest error of 1000 test shapes", true, true, {}, {}, {}};
   for (const Curve& curve : curves) {
     const double slope = curve.slope(&Discrepancy::largest);
@@ -82,7 +84,8 @@ void print_and_plot(Run& run, const std::string& title, const std::string& file,
   if (!run.out.empty()) write_svg(svg_of(plot), run.out / file);
 }
 
-/// A method of making point sets in the plane, and the thesis's slopes by rectangles, quarter circles, triangles.
+/// A method of making point sets in the plane, and the thesis's slopes by rectangles, quarter circles,
+/// triangles.
 struct PlaneMethod {
   std::string name;
   std::function<std::vector<Vector2d>(std::uint64_t count)> make;
@@ -95,7 +98,8 @@ std::vector<ParametricDot> dots_on(ParametricShape shape, ParametricOptions opti
   return sample_parametric(*make_surface(shape), options).dots;
 }
 
-PlaneMethod on_curve(const std::string& name, CurveKind curve, Sampler sampler, std::array<double, 3> of_thesis = {}) {
+PlaneMethod on_curve(const std::string& name, CurveKind curve, Sampler sampler,
+                     std::array<double, 3> of_thesis = {}) {
   return {name,
           [=](std::uint64_t count) {
             ParametricOptions options;
@@ -112,7 +116,8 @@ PlaneMethod plane_rival(const std::string& name, PlaneSet kind, std::array<doubl
   return {name, [kind](std::uint64_t count) { return plane_set(kind, count, count); }, of_thesis};
 }
 
-void plane_table(Run& run, const char* title, const std::string& file, const std::vector<PlaneMethod>& methods) {
+void plane_table(Run& run, const char* title, const std::string& file,
+                 const std::vector<PlaneMethod>& methods) {
   constexpr std::array<const char*, 3> kShapes{"rectangles", "quarter circles", "triangles"};
   std::array<std::vector<Curve>, 3> curves;
   for (const PlaneMethod& method : methods) {
@@ -126,19 +131,21 @@ void plane_table(Run& run, const char* title, const std::string& file, const std
   }
   print_head(title);
   for (std::size_t s = 0; s < 3; ++s)
-    print_and_plot(run, std::string(title) + ", " + kShapes[s], file + "_" + std::to_string(s) + ".svg", curves[s]);
+    print_and_plot(run, std::string(title) + ", " + kShapes[s], file + "_" + std::to_string(s) + ".svg",
+                   curves[s]);
 }
 
 void table_of_curve(Run& run, CurveKind curve, const char* title, const std::string& file,
                     const std::array<std::array<double, 3>, 4>& of_thesis) {
-  plane_table(
-      run, title, file,
-      {on_curve("random", curve, Sampler::kRandom, of_thesis[0]), on_curve("even", curve, Sampler::kEven, of_thesis[1]),
-       on_curve("low (halton)", curve, Sampler::kHalton, of_thesis[2]),
-       on_curve("low (hammersley)", curve, Sampler::kHammersley, of_thesis[2]),
-       on_curve("low (sobol)", curve, Sampler::kSobol, of_thesis[2]),
-       on_curve("low (niederreiter)", curve, Sampler::kNiederreiter, of_thesis[2]),
-       on_curve("jittered", curve, Sampler::kJittered, of_thesis[3]), on_curve("centroid", curve, Sampler::kCentroid)});
+  plane_table(run, title, file,
+              {on_curve("random", curve, Sampler::kRandom, of_thesis[0]),
+               on_curve("even", curve, Sampler::kEven, of_thesis[1]),
+               on_curve("low (halton)", curve, Sampler::kHalton, of_thesis[2]),
+               on_curve("low (hammersley)", curve, Sampler::kHammersley, of_thesis[2]),
+               on_curve("low (sobol)", curve, Sampler::kSobol, of_thesis[2]),
+               on_curve("low (niederreiter)", curve, Sampler::kNiederreiter, of_thesis[2]),
+               on_curve("jittered", curve, Sampler::kJittered, of_thesis[3]),
+               on_curve("centroid", curve, Sampler::kCentroid)});
 }
 
 void table_of_rivals(Run& run) {
@@ -169,7 +176,8 @@ SphereMethod sphere_curve(const std::string& name, AreaMethod area, Sampler samp
             options.area = area;
             options.sampler = sampler;
             std::vector<Vector3d> points;
-            for (const auto& dot : dots_on(ParametricShape::kSphere, options, count)) points.push_back(dot.position);
+            for (const auto& dot : dots_on(ParametricShape::kSphere, options, count))
+              points.push_back(dot.position);
             return points;
           },
           of_thesis};
@@ -183,7 +191,8 @@ void table_of_sphere(Run& run) {
       sphere_curve("Hilbert jittered, (c) fff", AreaMethod::kFirstFundamentalForm, Sampler::kJittered, -.73),
       sphere_curve("Hilbert jittered, (a) triangle", AreaMethod::kTriangle, Sampler::kJittered, -.71),
       sphere_curve("Hilbert jittered, (b) square", AreaMethod::kSquare, Sampler::kJittered, kNone),
-      sphere_curve("Hilbert centroid, (c) fff", AreaMethod::kFirstFundamentalForm, Sampler::kCentroid, kNone)};
+      sphere_curve("Hilbert centroid, (c) fff", AreaMethod::kFirstFundamentalForm, Sampler::kCentroid,
+                   kNone)};
   std::vector<Curve> curves;
   for (const SphereMethod& method : methods) {
     curves.push_back({method.name, method.of_thesis, {}, {}});
@@ -196,8 +205,8 @@ void table_of_sphere(Run& run) {
   print_and_plot(run, "Table 5.4: on the sphere", "table_5_4.svg", curves);
 }
 
-/// The thesis's control: as many dots on each triangle as its share of the area rounds to, anywhere on it; and plain
-/// random dots on the same surface.
+/// The thesis's control: as many dots on each triangle as its share of the area rounds to, anywhere on it;
+/// and plain random dots on the same surface.
 void mesh_table(Run& run, const std::string& file, double of_thesis) {
   PlacementOptions placement;
   placement.size_m = .08;
@@ -213,7 +222,9 @@ void mesh_table(Run& run, const std::string& file, double of_thesis) {
   for (const auto& [sampler, label] :
        {std::pair{Sampler::kJittered, "jittered"}, std::pair{Sampler::kCentroid, "centroid"},
         std::pair{Sampler::kRandom, "random"}}) {
-    const double thesis = sampler == Sampler::kJittered ? of_thesis : sampler == Sampler::kRandom ? -.50 : kNone;
+    const double thesis = sampler == Sampler::kJittered ? of_thesis
+                          : sampler == Sampler::kRandom ? -.50
+                                                        : kNone;
     sets.push_back({std::string(label) + ", triangle sets", thesis, {}, {}});
     balls.push_back({std::string(label) + ", balls", thesis, {}, {}});
     std::vector<DotSequence> sequences;
@@ -269,7 +280,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   for (int l = 1; l <= powers; ++l)
-    for (const std::uint64_t size : {std::uint64_t{1} << l, (std::uint64_t{1} << l) + (std::uint64_t{1} << (l - 1))})
+    for (const std::uint64_t size :
+         {std::uint64_t{1} << l, (std::uint64_t{1} << l) + (std::uint64_t{1} << (l - 1))})
       run.sizes.push_back(size);
   try {
     if (!run.out.empty()) std::filesystem::create_directories(run.out);

@@ -1,12 +1,13 @@
-// The cost of the wire: a program painted through the real drivers against the device servers of sim/wire, beside the
-// same program on the cell in process; how the time of a dot is divided; and the time from a stop to light off.
+// The cost of the wire: a program painted through the real drivers against the device servers of sim/wire,
+// beside the same program on the cell in process; how the time of a dot is divided; and the time from a stop
+// to light off.
 //
-//   wire_bench [STOPS]                        a generated program of 150 dots, 60 of them in real time, 40 stops
-//   wire_bench ahead                          the gain from messages sent ahead, in real time
+//   wire_bench [STOPS]                        a generated program of 150 dots, 60 of them in real time, 40
+//   stops wire_bench ahead                          the gain from messages sent ahead, in real time
 //   wire_bench MODEL SIZE_MM DPI SCALE REAL STOPS
 //
-// paints MODEL at SCALE wall seconds for each second of the cell, then its first REAL dots in real time, then measures
-// STOPS.
+// paints MODEL at SCALE wall seconds for each second of the cell, then its first REAL dots in real time, then
+// measures STOPS.
 
 #include <algorithm>
 #include <chrono>
@@ -64,10 +65,12 @@ void print_added_times(const std::vector<TimeRecord::Dot>& dots) {
     both.push_back(dot.before_s + dot.after_s);
   }
   std::printf(
-      "  added a dot, ms of the cell: median %.3f, p99 %.3f, worst %.3f (before the light %.3f / %.3f, after it %.3f / "
+      "  added a dot, ms of the cell: median %.3f, p99 %.3f, worst %.3f (before the light %.3f / %.3f, after "
+      "it %.3f / "
       "%.3f)\n",
-      quantile(both, .5) * 1e3, quantile(both, .99) * 1e3, quantile(both, 1) * 1e3, quantile(before, .5) * 1e3,
-      quantile(before, .99) * 1e3, quantile(after, .5) * 1e3, quantile(after, .99) * 1e3);
+      quantile(both, .5) * 1e3, quantile(both, .99) * 1e3, quantile(both, 1) * 1e3,
+      quantile(before, .5) * 1e3, quantile(before, .99) * 1e3, quantile(after, .5) * 1e3,
+      quantile(after, .99) * 1e3);
 }
 
 /// Paints on the wire and prints how the time is divided between devices, drivers and executor.
@@ -96,9 +99,9 @@ std::vector<Emission> painted_on_wire(const ExposureProgram& program, double tim
     result.own_time = own_time;
   }
   const double wall_s = std::chrono::duration<double>(Wall::now() - begun).count();
-  std::printf("scale %g: %zu of %zu dots, %zu in doubt, %d stops; %.1f s of the cell, %.1f s wall\n", time_scale,
-              journal.done_count(), program.exposures.size(), journal.in_doubt().size(), resumes, result.elapsed_s,
-              wall_s);
+  std::printf("scale %g: %zu of %zu dots, %zu in doubt, %d stops; %.1f s of the cell, %.1f s wall\n",
+              time_scale, journal.done_count(), program.exposures.size(), journal.in_doubt().size(), resumes,
+              result.elapsed_s, wall_s);
   print_added_times(world.wire().dot_times());
   std::printf("  the same by the executor's own watch: median %.3f, p99 %.3f, worst %.3f\n",
               result.own_time.quantile_s(.5) * 1e3, result.own_time.quantile_s(.99) * 1e3,
@@ -106,7 +109,8 @@ std::vector<Emission> painted_on_wire(const ExposureProgram& program, double tim
   return world.emissions();
 }
 
-/// Of the emissions in process, those that belong to the ones on the wire: a dot that was left in doubt may have none.
+/// Of the emissions in process, those that belong to the ones on the wire: a dot that was left in doubt may
+/// have none.
 std::vector<Emission> aligned(const std::vector<Emission>& in_process, const std::vector<Emission>& on_wire) {
   constexpr double kSamePlace = 1e-4;
   std::vector<Emission> found;
@@ -138,8 +142,8 @@ void compare(const std::vector<Emission>& in_process, const std::vector<Emission
     worst_power = std::max(worst_power, std::abs(energy_a - energy_b) / energy_a);
     hash.take(b.x());
   }
-  std::printf("focus to focus at most %.3f um; energies differ by at most %.4f %%; hash %016llx\n", worst_m * 1e6,
-              worst_power * 100, hash.value());
+  std::printf("focus to focus at most %.3f um; energies differ by at most %.4f %%; hash %016llx\n",
+              worst_m * 1e6, worst_power * 100, hash.value());
 }
 
 /// Hits on the object's surface, as the film takes them.
@@ -155,10 +159,13 @@ void compare_films(const std::string& model, double size_mm, const std::vector<E
   std::size_t missed = 0;
   for (std::size_t i = 0; i < std::min(hits.size(), others.size()); ++i) {
     if (hits[i].is_hit != others[i].is_hit) ++missed;
-    if (hits[i].is_hit && others[i].is_hit) away.push_back((hits[i].position_O - others[i].position_O).norm() * 1e6);
+    if (hits[i].is_hit && others[i].is_hit)
+      away.push_back((hits[i].position_O - others[i].position_O).norm() * 1e6);
   }
-  std::printf("hits on the surface: %zu compared, apart by median %.3f, p99 %.3f, at most %.3f um; %zu hit only once\n",
-              away.size(), quantile(away, .5), quantile(away, .99), quantile(away, 1), missed);
+  std::printf(
+      "hits on the surface: %zu compared, apart by median %.3f, p99 %.3f, at most %.3f um; %zu hit only "
+      "once\n",
+      away.size(), quantile(away, .5), quantile(away, .99), quantile(away, 1), missed);
 }
 
 /// The same device, without messages sent ahead.
@@ -196,7 +203,8 @@ class LaserToldInTime final : public Laser {
   Laser& laser_;
 };
 
-/// The table moves for every dot, each with another power; a chain of waypoints of the arm before every tenth.
+/// The table moves for every dot, each with another power; a chain of waypoints of the arm before every
+/// tenth.
 ExposureProgram restless_job(const CellDescription& cell, std::size_t count) {
   ExposureProgram program = test::small_job(cell, count, 1, count);
   program.vias.clear();
@@ -228,8 +236,9 @@ void measure_ahead() {
   constexpr std::size_t kDots = 100;
   constexpr int kRounds = 3;
   using Table = WireOptions::Table;
-  for (const auto& [name, table] : {std::pair{"oriental-az", Table::kOrientalAz}, std::pair{"cia402", Table::kCia402},
-                                    std::pair{"leadshine-pr", Table::kLeadshinePr}}) {
+  for (const auto& [name, table] :
+       {std::pair{"oriental-az", Table::kOrientalAz}, std::pair{"cia402", Table::kCia402},
+        std::pair{"leadshine-pr", Table::kLeadshinePr}}) {
     WireOptions options = WiredWorld::quick(1, .01);
     options.table = table;
     WiredWorld world(options);
@@ -243,8 +252,8 @@ void measure_ahead() {
       in_time.push_back(seconds_a_dot(world, program, {robot, slow_table, laser, cell.clock}));
       ahead.push_back(seconds_a_dot(world, program, cell));
     }
-    std::printf("%s, %zu dots, %d rounds: %.3f ms a dot told in time, %.3f ms told ahead\n", name, kDots, kRounds,
-                quantile(in_time, .5) * 1e3, quantile(ahead, .5) * 1e3);
+    std::printf("%s, %zu dots, %d rounds: %.3f ms a dot told in time, %.3f ms told ahead\n", name, kDots,
+                kRounds, quantile(in_time, .5) * 1e3, quantile(ahead, .5) * 1e3);
   }
 }
 
@@ -278,7 +287,8 @@ void measure_stops(int stops) {
     latencies.push_back(emissions.back().start_s + emissions.back().length_s - asked_s);
   }
   std::printf(
-      "stops: %zu measured, %d without light or word; from the call to the light's end: median %.3f ms, p99 %.3f ms, "
+      "stops: %zu measured, %d without light or word; from the call to the light's end: median %.3f ms, p99 "
+      "%.3f ms, "
       "worst %.3f ms\n",
       latencies.size(), lost, quantile(latencies, .5) * 1e3, quantile(latencies, .99) * 1e3,
       quantile(latencies, 1) * 1e3);
@@ -297,17 +307,18 @@ int main(int argc, char** argv) {
   const std::size_t real_dots = has_model ? static_cast<std::size_t>(std::atoi(argv[5])) : 60;
   const int stops = has_model ? std::atoi(argv[6]) : argc > 1 ? std::atoi(argv[1]) : 40;
   const CellDescription description = test::shipped_cell();
-  ExposureProgram program =
-      has_model ? planned(argv[1], std::atof(argv[2]), std::atof(argv[3])) : test::small_job(description, 150);
+  ExposureProgram program = has_model ? planned(argv[1], std::atof(argv[2]), std::atof(argv[3]))
+                                      : test::small_job(description, 150);
   const auto in_process = painted_in_process(program, description);
   const auto on_wire = painted_on_wire(program, time_scale);
   const auto beside = aligned(in_process, on_wire);
-  std::printf("%zu emissions in process, %zu on the wire, of which %zu stand beside each other\n", in_process.size(),
-              on_wire.size(), beside.size());
+  std::printf("%zu emissions in process, %zu on the wire, of which %zu stand beside each other\n",
+              in_process.size(), on_wire.size(), beside.size());
   compare(beside, on_wire, description);
   if (has_model) compare_films(argv[1], std::atof(argv[2]), beside, on_wire, description, program.pitch_m);
   program.exposures.resize(std::min(program.exposures.size(), real_dots));
-  std::erase_if(program.vias, [&](const Via& via) { return via.before_exposure >= program.exposures.size(); });
+  std::erase_if(program.vias,
+                [&](const Via& via) { return via.before_exposure >= program.exposures.size(); });
   painted_on_wire(program, 1);
   measure_stops(stops);
   return 0;

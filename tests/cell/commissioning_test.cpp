@@ -16,8 +16,9 @@
 #include "tests/daemon/server/daemon_process.h"
 #include "tests/support/shell.h"
 
-/// `hilbrush check-cell` and `hilbrush jog`, as processes, against simulated devices on wires: hilbrush-simcell as a
-/// process too, and the same devices in this one where the truth behind the wires is looked at.
+/// `hilbrush check-cell` and `hilbrush jog`, as processes, against simulated devices on wires:
+/// hilbrush-simcell as a process too, and the same devices in this one where the truth behind the wires is
+/// looked at.
 namespace hilbrush {
 namespace {
 
@@ -91,7 +92,9 @@ class CheckCell : public testing::Test {
   }
   void write_cell(const json& changed) const { std::ofstream(cell) << changed.dump(2); }
   CommandResult check() const { return hilbrush("check-cell " + quoted(cell)); }
-  json checked() const { return json::parse(hilbrush("check-cell --json " + quoted(cell)).output).at("devices"); }
+  json checked() const {
+    return json::parse(hilbrush("check-cell --json " + quoted(cell)).output).at("devices");
+  }
   static std::string problem_of(const json& device) {
     return device.at("problems").empty() ? "" : device.at("problems").front().get<std::string>();
   }
@@ -168,7 +171,8 @@ TEST_F(CheckCell, ACellThatADaemonDrivesIsLeftAlone) {
   world.options.time_scale.reset();
   const test::DaemonProcess daemon(world.options);
   test::connect(world.options);
-  for (const std::string& command : {"check-cell " + quoted(cell), "jog j1 --by-deg 1 --yes --cell " + quoted(cell)}) {
+  for (const std::string& command :
+       {"check-cell " + quoted(cell), "jog j1 --by-deg 1 --yes --cell " + quoted(cell)}) {
     const CommandResult result = hilbrush(command);
     EXPECT_EQ(result.exit_code, 5) << result.output;
     EXPECT_TRUE(has(result.output, "another process drives this cell")) << result.output;
@@ -188,7 +192,8 @@ class Jog : public testing::Test {
   }
   bool may_emit() {
     bool is_ordered = false;
-    world.wire().act([&](TrueCell& truth) { is_ordered = truth.is_emission_ordered() || truth.is_gate_open(); });
+    world.wire().act(
+        [&](TrueCell& truth) { is_ordered = truth.is_emission_ordered() || truth.is_gate_open(); });
     return is_ordered;
   }
   /// That axis by so much, and no other at all.

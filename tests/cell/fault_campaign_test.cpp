@@ -14,9 +14,9 @@
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"
 
-/// Faults of every kind in every phase of a dot. Whatever happens: no dot is lit twice, no light while an axis moves,
-/// no pulse longer than its bound, no hang; each job ends painted, or stopped and resumable with true counts. Every
-/// case follows from its number: run one alone with HILBRUSH_CASE=number.
+/// Faults of every kind in every phase of a dot. Whatever happens: no dot is lit twice, no light while an
+/// axis moves, no pulse longer than its bound, no hang; each job ends painted, or stopped and resumable with
+/// true counts. Every case follows from its number: run one alone with HILBRUSH_CASE=number.
 namespace hilbrush {
 namespace {
 
@@ -56,8 +56,8 @@ class CampaignWorld {
   virtual double patience_s() const = 0;
   /// How far an axis may drift without anybody's seeing it in time.
   virtual double drift_unseen() const = 0;
-  /// Where the robot itself loses the queued end of a pulse (an alarm; a refusal or a lost connection between on and
-  /// off): from there until its controller has seen that and turned the light off by another way.
+  /// Where the robot itself loses the queued end of a pulse (an alarm; a refusal or a lost connection between
+  /// on and off): from there until its controller has seen that and turned the light off by another way.
   virtual double lost_end_s() const = 0;
 };
 
@@ -84,7 +84,8 @@ class VirtualWorld final : public CampaignWorld {
   void forget_stop() override { cell_.clock.on_time = {}; }
   double patience_s() const override { return 300; }
   double drift_unseen() const override { return kDriftUnseen; }
-  /// Here asking for a status waits for a device that is late, unlike in real drivers: two patiences of the link.
+  /// Here asking for a status waits for a device that is late, unlike in real drivers: two patiences of the
+  /// link.
   double lost_end_s() const override { return .25; }
 
  private:
@@ -97,7 +98,9 @@ class WorldOnWires final : public CampaignWorld {
   WorldOnWires() : world_(WiredWorld::quick(kTimeScale)) {}
   Cell cell() override { return world_.cell(); }
   std::vector<Emission> emissions() override { return world_.emissions(); }
-  void add(const WireFault& fault) override { world_.wire().add_fault(test::in_wall_time(fault, kTimeScale)); }
+  void add(const WireFault& fault) override {
+    world_.wire().add_fault(test::in_wall_time(fault, kTimeScale));
+  }
   bool is_emitting() override {
     bool is_lit = false;
     world_.wire().act([&](TrueCell& cell) { is_lit = cell.is_emitting(); });
@@ -163,7 +166,8 @@ class Case {
   Journal journal_;
   ExecutionControl control_;
   std::string story_;
-  /// An axis that drifts a little is still in position: within what counts as that, and what passes before it is seen.
+  /// An axis that drifts a little is still in position: within what counts as that, and what passes before it
+  /// is seen.
   test::WitnessOptions witness_;
 };
 
@@ -184,7 +188,8 @@ void Case::order_faults() {
 
 bool Case::recover() {
   constexpr int kAttempts = 400;
-  if (control_.stop.load()) world_.forget_stop();  // as in the daemon: nothing is cleared while a stop is under way
+  if (control_.stop.load())
+    world_.forget_stop();  // as in the daemon: nothing is cleared while a stop is under way
   control_.stop = false;
   const Cell cell = world_.cell();
   for (int attempt = 0; attempt < kAttempts; ++attempt) {

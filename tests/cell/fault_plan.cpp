@@ -33,12 +33,13 @@ WireFault in_wall_time(WireFault fault, double time_scale) {
 }
 
 std::string described(const WireFault& fault) {
-  return fmt::format("{} of {} (axis {}, amount {:.3g}), {:.2f} ms into {} {}, {} messages, {:.1f} ms",
-                     kWireFaultNames[static_cast<std::size_t>(fault.kind)],
-                     kWireDeviceNames[static_cast<std::size_t>(fault.device)], kAxisNames[fault.axis], fault.amount,
-                     fault.trigger.delay_s * 1e3,
-                     fault.trigger.phase ? kCellPhaseNames[static_cast<std::size_t>(*fault.trigger.phase)] : "none",
-                     fault.trigger.occurrence, fault.messages, fault.duration_s * 1e3);
+  return fmt::format(
+      "{} of {} (axis {}, amount {:.3g}), {:.2f} ms into {} {}, {} messages, {:.1f} ms",
+      kWireFaultNames[static_cast<std::size_t>(fault.kind)],
+      kWireDeviceNames[static_cast<std::size_t>(fault.device)], kAxisNames[fault.axis], fault.amount,
+      fault.trigger.delay_s * 1e3,
+      fault.trigger.phase ? kCellPhaseNames[static_cast<std::size_t>(*fault.trigger.phase)] : "none",
+      fault.trigger.occurrence, fault.messages, fault.duration_s * 1e3);
 }
 
 }  // namespace hilbrush::test

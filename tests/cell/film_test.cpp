@@ -12,7 +12,8 @@
 #include "tests/cell/wired_world.h"
 #include "tests/cell/witness.h"
 
-/// The main job from model to film, once on the cell in process and once through the real drivers over the wire.
+/// The main job from model to film, once on the cell in process and once through the real drivers over the
+/// wire.
 namespace hilbrush {
 namespace {
 

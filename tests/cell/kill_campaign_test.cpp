@@ -12,9 +12,9 @@
 #include "tests/cell/witness.h"
 #include "tests/daemon/server/daemon_process.h"
 
-/// hilbrushd killed with SIGKILL at random moments of a job over the wire, begun again, and the job resumed: by the
-/// emissions' record no dot is lit twice, none is lost, and each kill leaves at most one in doubt. HILBRUSH_LONG: 200
-/// kills of a job in real time.
+/// hilbrushd killed with SIGKILL at random moments of a job over the wire, begun again, and the job resumed:
+/// by the emissions' record no dot is lit twice, none is lost, and each kill leaves at most one in doubt.
+/// HILBRUSH_LONG: 200 kills of a job in real time.
 namespace hilbrush {
 namespace {
 
@@ -29,17 +29,19 @@ class KillCampaign : public testing::Test {
   static bool is_long() { return std::getenv("HILBRUSH_LONG") != nullptr; }
 
   Json job(LineClient& client) { return client.result("job.get", {{"id", id_}}).at("job"); }
-  /// What an operator does until the job is being painted, or done. On a busy machine the laser's guard may have turned
-  /// it off meanwhile: then all three acts are made again.
+  /// What an operator does until the job is being painted, or done. On a busy machine the laser's guard may
+  /// have turned it off meanwhile: then all three acts are made again.
   void start(LineClient& client) {
     constexpr int kAttempts = 200;
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       const bool is_ready = client.error_code("cell.clear") == 0 && client.error_code("cell.arm") == 0;
       const bool is_first = job(client).at("state") == "ready";
-      if (is_ready) client.error_code(is_first ? "job.start" : "job.resume", {{"id", id_}, {"part_in_place", true}});
+      if (is_ready)
+        client.error_code(is_first ? "job.start" : "job.resume", {{"id", id_}, {"part_in_place", true}});
       for (;;) {
         const Json now = job(client);
-        if (now.at("state") == "done" || (now.at("state") == "painting" && now.at("stage") == "paint")) return;
+        if (now.at("state") == "done" || (now.at("state") == "painting" && now.at("stage") == "paint"))
+          return;
         if (now.at("state") == "failed") throw std::runtime_error("the job failed: " + now.dump());
         if (now.at("state") == "paused" || now.at("state") == "ready") break;
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -113,7 +115,8 @@ TEST_F(KillCampaign, NoDotTwiceNoneLostAtMostOneInDoubtEach) {
     ASSERT_LE(testimony.light[i], 1) << "dot " << i << " was lit twice";
     ASSERT_TRUE(testimony.is_whole[i] || in_doubt.contains(i)) << "dot " << i << ": " << testimony.light[i];
   }
-  std::printf("%d kills: %zu dots painted once, %zu in doubt\n", kills, dots_ - in_doubt.size(), in_doubt.size());
+  std::printf("%d kills: %zu dots painted once, %zu in doubt\n", kills, dots_ - in_doubt.size(),
+              in_doubt.size());
 }
 
 }  // namespace

@@ -10,9 +10,9 @@
 #include "tests/cell/witness.h"
 #include "tests/daemon/server/soak_support.h"
 
-/// The daemon with its real drivers on wires, for long: jobs, faults of every kind, connections that are lost and made
-/// again, stops, the daemon's own restarts, clients that mean no good. HILBRUSH_LONG=1 makes it an hour,
-/// HILBRUSH_SOAK_S=N makes it N seconds.
+/// The daemon with its real drivers on wires, for long: jobs, faults of every kind, connections that are lost
+/// and made again, stops, the daemon's own restarts, clients that mean no good. HILBRUSH_LONG=1 makes it an
+/// hour, HILBRUSH_SOAK_S=N makes it N seconds.
 namespace hilbrush {
 namespace {
 
@@ -118,10 +118,11 @@ TEST(WireSoakTest, FaultsReconnectionsAndClientsLeaveNoTraceAndCountsAreTrue) {
   const unsigned seed = 77;
   SCOPED_TRACE(seed);
   WireSoak soak(seed);
-  const test::SoakTrace trace = test::soak(soak.world(), test::soak_length(12), [&] { soak.paint_one_job(); });
-  std::cout << trace.jobs << " jobs, " << soak.dots << " dots, " << soak.doubts << " in doubt, " << soak.disturbances
-            << " disturbances, " << soak.lost_connections << " lost connections, " << soak.restarts << " restarts, "
-            << trace << "\n";
+  const test::SoakTrace trace =
+      test::soak(soak.world(), test::soak_length(12), [&] { soak.paint_one_job(); });
+  std::cout << trace.jobs << " jobs, " << soak.dots << " dots, " << soak.doubts << " in doubt, "
+            << soak.disturbances << " disturbances, " << soak.lost_connections << " lost connections, "
+            << soak.restarts << " restarts, " << trace << "\n";
   test::expect_no_trace(trace);
 }
 

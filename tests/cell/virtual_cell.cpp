@@ -134,9 +134,10 @@ typename VirtualAxes<N>::Status VirtualAxes<N>::status() {
   else if (rest_since_s_ < 0)
     rest_since_s_ = now_s;
   Status status;
-  status.in_position =
-      state_ == DeviceState::kReady && has_target_ && rest_since_s_ >= 0 && now_s >= rest_since_s_ + settle_s_;
-  status.state = state_ == DeviceState::kReady && has_target_ && !status.in_position ? DeviceState::kMoving : state_;
+  status.in_position = state_ == DeviceState::kReady && has_target_ && rest_since_s_ >= 0 &&
+                       now_s >= rest_since_s_ + settle_s_;
+  status.state =
+      state_ == DeviceState::kReady && has_target_ && !status.in_position ? DeviceState::kMoving : state_;
   status.positions = seen_;
   status.fault = fault_;
   return status;
@@ -162,10 +163,12 @@ template class VirtualAxes<2>;
 
 // ---- robot
 
-void VirtualRobot::command(bool is_motion, const std::string& name, const std::vector<std::string>& arguments) {
+void VirtualRobot::command(bool is_motion, const std::string& name,
+                           const std::vector<std::string>& arguments) {
   link_.exchange([&] {
     auto& controller = devices_.robot();
-    const std::string answer = is_motion ? controller.motion(name, arguments) : controller.dashboard(name, arguments);
+    const std::string answer =
+        is_motion ? controller.motion(name, arguments) : controller.dashboard(name, arguments);
     return answer.starts_with("0,");
   });
 }
@@ -245,7 +248,8 @@ void VirtualRobot::pulse(double pulse_s) {
 bool VirtualRobot::gate_off() noexcept {
   try {
     if (link_.is_lost()) link_.connect();  // the immediate port is another connection
-    // Off first: clearing the queue drops the off that waits in it. Then again, should an on have come between.
+    // Off first: clearing the queue drops the off that waits in it. Then again, should an on have come
+    // between.
     link_.exchange([&] {
       auto& controller = devices_.robot();
       controller.dashboard("doexecute", {"1", "0"});
@@ -305,8 +309,9 @@ void VirtualTable::order_move(const Positions& target) {
   for (std::size_t i = 0; i < 2; ++i)
     link_.exchange([&] {
       DriveAxis& axis = devices_.table_axis(i);
-      return axis.alarm() == 0 && axis.move(axis.steps(target[i]), axis.limits().speed_max * axis.steps_per_unit(),
-                                            axis.limits().acceleration_max * axis.steps_per_unit());
+      return axis.alarm() == 0 &&
+             axis.move(axis.steps(target[i]), axis.limits().speed_max * axis.steps_per_unit(),
+                       axis.limits().acceleration_max * axis.steps_per_unit());
     });
 }
 
@@ -343,7 +348,8 @@ void VirtualLaser::enable() {
   });
   while (devices_.cell().is_in_start_delay()) clock_.sleep_until(clock_.now_s() + .01);
   power_w_ = devices_.cell().power_w();
-  if (!devices_.cell().is_emission_ordered()) throw DriverError("the laser was turned off again in its start delay");
+  if (!devices_.cell().is_emission_ordered())
+    throw DriverError("the laser was turned off again in its start delay");
   state_ = DeviceState::kReady;
 }
 
@@ -391,7 +397,8 @@ Laser::Status VirtualLaser::status() {
         if (devices_.cell().is_tripped() && state_ == DeviceState::kReady) fail("the interlock was opened");
         if (devices_.cell().power_w() != power_w_ && state_ == DeviceState::kReady)
           fail("its power is not what was set");
-        if (!devices_.cell().is_emission_ordered() && state_ == DeviceState::kReady) state_ = DeviceState::kConnected;
+        if (!devices_.cell().is_emission_ordered() && state_ == DeviceState::kReady)
+          state_ = DeviceState::kConnected;
         return true;
       });
     } catch (const DriverError&) {  // one reading less, or a lost link

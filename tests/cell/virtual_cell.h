@@ -5,10 +5,10 @@
 #include "drivers/cell.h"
 #include "sim/wire/wired_devices.h"
 
-/// The devices of the simulated cell, with all their faults, behind the drivers' interfaces without any wire between:
-/// under virtual time, in which thousands of jobs with faults take seconds. These replacements of the drivers are only
-/// as careful as drivers must be: they believe a device that reports "in position" at its target for the settle time;
-/// an exchange that fails leaves the link lost.
+/// The devices of the simulated cell, with all their faults, behind the drivers' interfaces without any wire
+/// between: under virtual time, in which thousands of jobs with faults take seconds. These replacements of
+/// the drivers are only as careful as drivers must be: they believe a device that reports "in position" at
+/// its target for the settle time; an exchange that fails leaves the link lost.
 namespace hilbrush::test {
 
 class VirtualClock final : public Clock {
@@ -29,7 +29,8 @@ class VirtualLink {
  public:
   VirtualLink(WireDevice device, WiredDevices& devices, VirtualClock& clock)
       : device_(device), devices_(devices), clock_(clock) {}
-  /// `act` is what the device does when it obeys; false: it refuses. @throws DriverError as the fault wants it
+  /// `act` is what the device does when it obeys; false: it refuses. @throws DriverError as the fault wants
+  /// it
   void exchange(const std::function<bool()>& act);
   bool is_lost() const { return !lost_.empty(); }
   const std::string& why() const { return lost_; }
@@ -61,7 +62,8 @@ class VirtualDevice {
   std::string fault_;
 };
 
-/// What robot and table have in common: where they were sent, where they were last seen, and since when they rest.
+/// What robot and table have in common: where they were sent, where they were last seen, and since when they
+/// rest.
 template <std::size_t N>
 class VirtualAxes : public AxisGroup<N>, protected VirtualDevice {
  public:
@@ -97,7 +99,8 @@ class VirtualAxes : public AxisGroup<N>, protected VirtualDevice {
 
 class VirtualRobot final : public VirtualAxes<4> {
  public:
-  VirtualRobot(WiredDevices& devices, VirtualClock& clock) : VirtualAxes(WireDevice::kRobot, devices, clock) {}
+  VirtualRobot(WiredDevices& devices, VirtualClock& clock)
+      : VirtualAxes(WireDevice::kRobot, devices, clock) {}
   void connect() override;
   void enable() override;
   void clear_fault() override;
@@ -120,7 +123,8 @@ class VirtualRobot final : public VirtualAxes<4> {
 
 class VirtualTable final : public VirtualAxes<2> {
  public:
-  VirtualTable(WiredDevices& devices, VirtualClock& clock) : VirtualAxes(WireDevice::kTable, devices, clock) {}
+  VirtualTable(WiredDevices& devices, VirtualClock& clock)
+      : VirtualAxes(WireDevice::kTable, devices, clock) {}
   void connect() override;
   void enable() override;
   void clear_fault() override;

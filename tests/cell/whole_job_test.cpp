@@ -40,8 +40,9 @@ TEST(WholeJobTest, ASmallProgramThroughTheRealDrivers) {
   }
 }
 
-/// Modbus RTU and SCPI on pseudo-terminals, through libmodbus and libserialport as on a real line. That library must be
-/// made to take a pseudo-terminal for a serial port: see tests/support/preload, loaded in front of this program.
+/// Modbus RTU and SCPI on pseudo-terminals, through libmodbus and libserialport as on a real line. That
+/// library must be made to take a pseudo-terminal for a serial port: see tests/support/preload, loaded in
+/// front of this program.
 TEST(WholeJobTest, OverSerialLines) {
   if (std::getenv("HILBRUSH_SERIAL_PRELOADED") == nullptr)
     GTEST_SKIP() << "needs LD_PRELOAD=libserial_over_pty.so and HILBRUSH_SERIAL_PRELOADED=1";
@@ -66,7 +67,8 @@ TEST(WholeJobTest, ByRegisterMaps) {
   }
 }
 
-/// A laser whose gate is its own serial command, timed by the guard: as exact as a process can be, never in motion.
+/// A laser whose gate is its own serial command, timed by the guard: as exact as a process can be, never in
+/// motion.
 TEST(WholeJobTest, ByASerialGate) {
   WireOptions options = WiredWorld::quick(1);
   options.laser = WireOptions::LaserHead::kCobolt;
@@ -76,7 +78,8 @@ TEST(WholeJobTest, ByASerialGate) {
   const auto testimony = test::hear_witness(program, world.emissions());
   EXPECT_EQ(testimony.in_motion, 0u);
   EXPECT_EQ(testimony.strays, 0u);
-  for (std::size_t i = 0; i < program.exposures.size(); ++i) EXPECT_EQ(testimony.light[i], 1) << "exposure " << i;
+  for (std::size_t i = 0; i < program.exposures.size(); ++i)
+    EXPECT_EQ(testimony.light[i], 1) << "exposure " << i;
 }
 
 }  // namespace

@@ -40,7 +40,8 @@ WireOptions WiredWorld::quick(double time_scale, double start_delay_s) {
 
 WiredWorld::WiredWorld(const WireOptions& options, Drivers drivers)
     : wire_(shipped_cell(), options),
-      cell_file_(folder_.write("cell.json", wired_cell_text(shipped_text(), wire_.endpoints(), options.time_scale))),
+      cell_file_(
+          folder_.write("cell.json", wired_cell_text(shipped_text(), wire_.endpoints(), options.time_scale))),
       description(load_cell(cell_file_)) {
   wire_.set_emission_sink([this](const Emission& emission) {
     const std::lock_guard lock(mutex_);
@@ -98,7 +99,8 @@ std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDes
   return emissions;
 }
 
-ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsigned seed, std::size_t table_every) {
+ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsigned seed,
+                          std::size_t table_every) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> step(-.004, .004);
   Joints home;
@@ -117,7 +119,8 @@ ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsign
       program.vias.push_back({static_cast<std::uint32_t>(i), at});
       at[kJ3] = .2;
     }
-    for (const std::size_t k : {kJ1, kJ2, kJ4}) at[k] = std::clamp(at[k] + step(random), home[k] - .2, home[k] + .2);
+    for (const std::size_t k : {kJ1, kJ2, kJ4})
+      at[k] = std::clamp(at[k] + step(random), home[k] - .2, home[k] + .2);
     at[kJ3] = std::clamp(at[kJ3] + .1 * step(random), .15, .21);
     program.exposures.push_back(small_exposure(i, at));
   }

@@ -11,8 +11,8 @@
 #include "sim/wire/wire_cell.h"
 #include "tests/support/temporary_folder.h"
 
-/// A whole cell on wires in one process: the real drivers, chosen by a cell file as the daemon would choose them,
-/// against the simulated devices; nothing between them but sockets. And what the film's side saw of it.
+/// A whole cell on wires in one process: the real drivers, chosen by a cell file as the daemon would choose
+/// them, against the simulated devices; nothing between them but sockets. And what the film's side saw of it.
 namespace hilbrush::test {
 
 class WiredWorld {
@@ -25,8 +25,8 @@ class WiredWorld {
 
   /// New drivers, as after the daemon's restart; the devices stay as they are.
   void reconnect();
-  /// Disconnected or in fault -> ready and armed: what an operator does with clear and arm. Tries again while a fault
-  /// that was ordered still lasts. @throws DriverError
+  /// Disconnected or in fault -> ready and armed: what an operator does with clear and arm. Tries again while
+  /// a fault that was ordered still lasts. @throws DriverError
   void recover(ExecutionControl& control, int attempts = 1);
   Cell cell() { return devices_->cell(); }
   WireCell& wire() { return wire_; }
@@ -56,8 +56,8 @@ CellDescription shipped_cell();
 /// What the same cell emits in process, under virtual time. @throws std::runtime_error if it does not finish
 std::vector<Emission> painted_in_process(const ExposureProgram& program, CellDescription description);
 
-/// A program for the shipped cell: small steps of the arm about its home, a table move every `table_every` exposures
-/// with a way-point before it, a way home. Each exposure's joints are its own.
+/// A program for the shipped cell: small steps of the arm about its home, a table move every `table_every`
+/// exposures with a way-point before it, a way home. Each exposure's joints are its own.
 ExposureProgram small_job(const CellDescription& cell, std::size_t count, unsigned seed = 1,
                           std::size_t table_every = 20);
 

@@ -47,7 +47,8 @@ class Places {
 std::vector<Emission> joined(const std::vector<Emission>& emissions) {
   std::vector<Emission> pulses;
   for (const Emission& emission : emissions) {
-    if (!pulses.empty() && std::abs(pulses.back().start_s + pulses.back().length_s - emission.start_s) < 1e-9) {
+    if (!pulses.empty() &&
+        std::abs(pulses.back().start_s + pulses.back().length_s - emission.start_s) < 1e-9) {
       pulses.back().length_s += emission.length_s;
       pulses.back().is_moving = pulses.back().is_moving || emission.is_moving;
       pulses.back().power_w = std::min(pulses.back().power_w, emission.power_w);
@@ -60,7 +61,8 @@ std::vector<Emission> joined(const std::vector<Emission>& emissions) {
 
 }  // namespace
 
-Testimony hear_witness(const ExposureProgram& program, std::vector<Emission> emissions, const WitnessOptions& options) {
+Testimony hear_witness(const ExposureProgram& program, std::vector<Emission> emissions,
+                       const WitnessOptions& options) {
   const Places places(program);
   Testimony testimony;
   testimony.light.resize(program.exposures.size());
@@ -68,7 +70,8 @@ Testimony hear_witness(const ExposureProgram& program, std::vector<Emission> emi
   for (const Emission& emission : joined(emissions)) {
     if (emission.is_moving) ++testimony.in_motion;
     const auto place = places.nearest(emission.joints, options.joint_tolerance);
-    const double commanded_s = place ? static_cast<double>(program.exposures[*place].pulse_s) : emission.commanded_s;
+    const double commanded_s =
+        place ? static_cast<double>(program.exposures[*place].pulse_s) : emission.commanded_s;
     const double overrun_s = emission.length_s - commanded_s;
     testimony.longest_overrun_s = std::max(testimony.longest_overrun_s, overrun_s);
     if (overrun_s > options.overrun_s + 1e-9) ++testimony.too_long;
@@ -79,8 +82,8 @@ Testimony hear_witness(const ExposureProgram& program, std::vector<Emission> emi
     const Exposure& exposure = program.exposures[*place];
     const double energy_j = emission.length_s * emission.power_w;
     const double wanted_j = static_cast<double>(exposure.power_w) * static_cast<double>(exposure.pulse_s);
-    testimony.is_whole[*place] =
-        ++testimony.light[*place] == 1 && std::abs(energy_j - wanted_j) <= options.energy_tolerance * wanted_j;
+    testimony.is_whole[*place] = ++testimony.light[*place] == 1 &&
+                                 std::abs(energy_j - wanted_j) <= options.energy_tolerance * wanted_j;
   }
   return testimony;
 }

@@ -47,7 +47,8 @@ InputError device_refusal_of(const Json& json) {
 
 TEST(CellDevices, SimulatedDevicesNeedNothing) {
   const auto options = cell_devices_from_json(
-      cell_with(R"({"robot": "simulated", "table": {"driver": "simulated"}, "laser": "simulated"})").dump(), "");
+      cell_with(R"({"robot": "simulated", "table": {"driver": "simulated"}, "laser": "simulated"})").dump(),
+      "");
   EXPECT_TRUE(options.is_simulated());
 }
 
@@ -104,20 +105,25 @@ TEST(CellDevices, RefusalsNameTheirPlace) {
   EXPECT_EQ(refused_at([](Json& d) { d["robot"]["driver"] = "obis"; }), "cell.json: $.devices.robot.driver");
   EXPECT_EQ(refused_at([](Json& d) { d["robot"].erase("host"); }), "cell.json: $.devices.robot.host");
   EXPECT_EQ(refused_at([](Json& d) { d["robot"]["hosts"] = "x"; }), "cell.json: $.devices.robot.hosts");
-  EXPECT_EQ(refused_at([](Json& d) { d["robot"]["motion_port"] = 70000; }), "cell.json: $.devices.robot.motion_port");
+  EXPECT_EQ(refused_at([](Json& d) { d["robot"]["motion_port"] = 70000; }),
+            "cell.json: $.devices.robot.motion_port");
   EXPECT_EQ(refused_at([](Json& d) { d["robot"]["axes"]["j1"]["sign"] = .5; }),
             "cell.json: $.devices.robot.axes.j1.sign");
   EXPECT_EQ(refused_at([](Json& d) { d["table"]["host"] = "x"; }), "cell.json: $.devices.table.host");
-  EXPECT_EQ(refused_at([](Json& d) { d["table"]["axes"]["c"]["unit"] = 1; }), "cell.json: $.devices.table.axes.c.unit");
-  EXPECT_EQ(refused_at([](Json& d) { d["table"]["driver"] = "modbus-axes"; }), "cell.json: $.devices.table.map");
+  EXPECT_EQ(refused_at([](Json& d) { d["table"]["axes"]["c"]["unit"] = 1; }),
+            "cell.json: $.devices.table.axes.c.unit");
+  EXPECT_EQ(refused_at([](Json& d) { d["table"]["driver"] = "modbus-axes"; }),
+            "cell.json: $.devices.table.map");
   EXPECT_EQ(refused_at([](Json& d) {
               d["table"]["driver"] = "modbus-axes";
               d["table"]["map"] = "none-such";
             }),
             "cell.json: $.devices.table.map");
-  EXPECT_EQ(refused_at([](Json& d) { d["laser"]["gate"]["of"] = "laser"; }), "cell.json: $.devices.laser.gate.of");
+  EXPECT_EQ(refused_at([](Json& d) { d["laser"]["gate"]["of"] = "laser"; }),
+            "cell.json: $.devices.laser.gate.of");
   EXPECT_EQ(refused_at([](Json& d) { d["robot"] = "simulated"; }), "cell.json: $.devices.laser.gate.of");
-  EXPECT_EQ(refused_at([](Json& d) { d["laser"]["gate"]["output"] = 0; }), "cell.json: $.devices.laser.gate.output");
+  EXPECT_EQ(refused_at([](Json& d) { d["laser"]["gate"]["output"] = 0; }),
+            "cell.json: $.devices.laser.gate.output");
 }
 
 TEST(RegisterMaps, TheShippedOnesAreReadAndFoundByName) {
@@ -148,14 +154,18 @@ TEST(RegisterMaps, RefusalsNameTheirPlace) {
   EXPECT_EQ(refused_at([](Json& m) { m["word_order"] = "sideways"; }), "map.json: $.word_order");
   EXPECT_EQ(refused_at([](Json& m) { m["registers"]["mode"]["address"] = "0x10000"; }),
             "map.json: $.registers.mode.address");
-  EXPECT_EQ(refused_at([](Json& m) { m["registers"]["mode"]["words"] = 3; }), "map.json: $.registers.mode.words");
+  EXPECT_EQ(refused_at([](Json& m) { m["registers"]["mode"]["words"] = 3; }),
+            "map.json: $.registers.mode.words");
   EXPECT_EQ(refused_at([](Json& m) { m["stop"] = Json::array(); }), "map.json: $.stop");
   EXPECT_EQ(refused_at([](Json& m) { m.erase("prepare"); }), "map.json: $.move") << "no target";
   const auto step = [](const char* text) { return Json::parse(text); };
   EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"write": "mode", "value": 1})")); }),
             "map.json: $.prepare");
-  EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"pause_ms": 1})")); }), "map.json: $.prepare");
-  EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"write": "controlword", "from": "speed"})")); }),
+  EXPECT_EQ(refused_at([&](Json& m) { m["prepare"].push_back(step(R"({"pause_ms": 1})")); }),
+            "map.json: $.prepare");
+  EXPECT_EQ(refused_at([&](Json& m) {
+              m["prepare"].push_back(step(R"({"write": "controlword", "from": "speed"})"));
+            }),
             "map.json: $.prepare")
       << "it starts moves";
   EXPECT_EQ(refused_at([&](Json& m) {

@@ -64,7 +64,8 @@ std::vector<Json::json_pointer> default_keys() {
 /// Without those that may be left out, or be null: they have tests of their own.
 std::vector<Json::json_pointer> required_keys() {
   std::vector<Json::json_pointer> keys = default_keys();
-  std::erase_if(keys, [](const Json::json_pointer& key) { return key.to_string().starts_with("/arm/column_"); });
+  std::erase_if(keys,
+                [](const Json::json_pointer& key) { return key.to_string().starts_with("/arm/column_"); });
   return keys;
 }
 
@@ -135,7 +136,8 @@ TEST(CellFile, EveryKeyOfAnotherTypeIsRefused) {
       Json json = whole;
       json[key] = wrong;
       const Refusal refusal = refusal_of(json);
-      EXPECT_EQ(refusal.at.substr(0, json_path(key).size()), json_path(key)) << wrong << " " << refusal.sentence;
+      EXPECT_EQ(refusal.at.substr(0, json_path(key).size()), json_path(key))
+          << wrong << " " << refusal.sentence;
       EXPECT_TRUE(refusal.sentence.starts_with("expected ")) << refusal.sentence;
     }
   }
@@ -191,25 +193,34 @@ TEST(CellFile, ValuesThatContradictEachOtherAreRefused) {
       {"/laser/power_max_mw", 0.1, "$.laser.power_max_mw", "not above power_min_mw"},
       {"/laser/pulse_ms", 51, "$.laser.pulse_ms", "outside pulse_min_ms to pulse_max_ms"},
       {"/laser/pulse_max_ms", 0.5, "$.laser.pulse_max_ms", "below pulse_min_ms"},
-      {"/laser/spot_diameter_mm", 0.3, "$.laser.spot_pitches", "contradicts spot_diameter_mm: give one of the two"},
+      {"/laser/spot_diameter_mm", 0.3, "$.laser.spot_pitches",
+       "contradicts spot_diameter_mm: give one of the two"},
       {"/paint/reflectance_black", 1, "$.paint.reflectance_black", "not below reflectance_white"},
       {"/paint/response", "magic", "$.paint.response",
        "expected \"linear\", \"saturating\" or \"sigmoid\", found \"magic\""},
       {"/timing/settle_max_ms", 10, "$.timing.settle_max_ms", "below settle_min_ms"},
-      {"/table/tilt_axis_mm", {260, 0}, "$.table.tilt_axis_mm", "expected a list of 3 numbers, found a list of 2"},
+      {"/table/tilt_axis_mm",
+       {260, 0},
+       "$.table.tilt_axis_mm",
+       "expected a list of 3 numbers, found a list of 2"},
       {"/table/tilt_axis_mm",
        {260, 0, "x"},
        "$.table.tilt_axis_mm[2]",
        "expected a number from -5000 to 5000, found \"x\""},
-      {"/paint/tone_curves", with("wanted", {0, .5, .9}), "$.paint.tone_curves[0].wanted", "does not go from 0 to 1"},
+      {"/paint/tone_curves", with("wanted", {0, .5, .9}), "$.paint.tone_curves[0].wanted",
+       "does not go from 0 to 1"},
       {"/paint/tone_curves", with("wanted", {0, 1, 1}), "$.paint.tone_curves[0].wanted",
        "must increase from each number to the next"},
-      {"/paint/tone_curves", with("asked", {0, 1.2, 1.1}), "$.paint.tone_curves[0].asked", "must not decrease"},
+      {"/paint/tone_curves", with("asked", {0, 1.2, 1.1}), "$.paint.tone_curves[0].asked",
+       "must not decrease"},
       {"/paint/tone_curves", with("asked", {0, 1}), "$.paint.tone_curves[0].asked",
        "expected a list of 3 numbers, found a list of 2"},
       {"/paint/tone_curves", with("asked", {0, 1, 2.1}), "$.paint.tone_curves[0].asked[2]",
        "expected a number from 0 to 2, found 2.1"},
-      {"/paint/tone_curves", {curve, curve}, "$.paint.tone_curves[1].sampler", "\"centroid\" has a curve already"},
+      {"/paint/tone_curves",
+       {curve, curve},
+       "$.paint.tone_curves[1].sampler",
+       "\"centroid\" has a curve already"},
       {"/paint/tone_curves", with("x", 1), "$.paint.tone_curves[0].x", "unknown key"},
   };
   for (const Case& c : cases) {
@@ -251,13 +262,15 @@ TEST(CellFile, ToneCurvesAreChosenByPlacementLevelsAndSpot) {
     return Json{{"sampler", sampler},   {"curve", curve},   {"levels", levels},
                 {"spot_pitches", spot}, {"wanted", {0, 1}}, {"asked", {0, black}}};
   };
-  json["paint"]["tone_curves"] = {entry("centroid", "hilbert", 1, 1.4, 1.1), entry("centroid", "hilbert", 1, 2.8, 1.2),
-                                  entry("centroid", "peano2", 1, 1.4, 1.3),  entry("centroid", "hilbert", 3, 1.4, 1.4),
-                                  entry("centroid", "laminar", 1, 1.4, 1.5), entry("even", "peano2", 1, 1.4, 1.6)};
+  json["paint"]["tone_curves"] = {
+      entry("centroid", "hilbert", 1, 1.4, 1.1), entry("centroid", "hilbert", 1, 2.8, 1.2),
+      entry("centroid", "peano2", 1, 1.4, 1.3),  entry("centroid", "hilbert", 3, 1.4, 1.4),
+      entry("centroid", "laminar", 1, 1.4, 1.5), entry("even", "peano2", 1, 1.4, 1.6)};
   const CellDescription cell = cell_from_json(json.dump(), "");
   std::string warning;
   const auto black = [&](const char* sampler, const char* curve, int levels, double spot) {
-    const CellTone tone = cell_tone(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = spot});
+    const CellTone tone =
+        cell_tone(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = spot});
     warning = tone.warning;
     return tone.options.curve.asked.empty() ? 0 : tone.options.curve.asked.back();
   };
@@ -271,7 +284,8 @@ TEST(CellFile, ToneCurvesAreChosenByPlacementLevelsAndSpot) {
   EXPECT_EQ(black("even", "hilbert", 1, 1.4), 1.6);
   EXPECT_NE(warning.find("that on curve \"peano2\" is used"), std::string::npos) << warning;
   EXPECT_EQ(black("centroid", "hilbert", 2, 1.4), 0);
-  EXPECT_NE(warning.find("no tone curve for sampler \"centroid\" with 2 levels: tones will be off"), std::string::npos);
+  EXPECT_NE(warning.find("no tone curve for sampler \"centroid\" with 2 levels: tones will be off"),
+            std::string::npos);
   EXPECT_EQ(black("centroid", "hilbert", 1, 2), 1.1);
   EXPECT_NE(warning.find("made for a spot of 1.4 pitches"), std::string::npos) << warning;
 }
@@ -282,11 +296,14 @@ TEST(CellFile, TheShippedCellIsCalibratedForAllThatAJobCanName) {
        {"centroid", "jittered", "even", "random", "halton", "hammersley", "sobol", "niederreiter", "blue"})
     for (const char* curve : {"hilbert", "peano2"})
       for (int levels = 1; levels <= 4; ++levels)
-        EXPECT_EQ(cell_tone(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = 1.41}).warning,
-                  "")
+        EXPECT_EQ(
+            cell_tone(cell, {.sampler = sampler, .curve = curve, .levels = levels, .spot_pitches = 1.41})
+                .warning,
+            "")
             << sampler << " on " << curve << ' ' << levels;
-  EXPECT_EQ(cell_tone(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}).warning,
-            "");
+  EXPECT_EQ(
+      cell_tone(cell, {.sampler = "centroid", .curve = "laminar", .levels = 1, .spot_pitches = 1.41}).warning,
+      "");
 }
 
 TEST(CellFile, WarningsNameWhatIsAllowedButOdd) {
@@ -298,7 +315,8 @@ TEST(CellFile, WarningsNameWhatIsAllowedButOdd) {
   };
   EXPECT_TRUE(warnings("/name", "x").empty());
   ASSERT_EQ(warnings("/laser/spot_pitches", 1.19).size(), 1u);
-  EXPECT_TRUE(warnings("/laser/spot_pitches", 1.19)[0].starts_with("$.laser.spot_pitches: 1.19 is outside 1.2 to 1.8"));
+  EXPECT_TRUE(warnings("/laser/spot_pitches", 1.19)[0].starts_with(
+      "$.laser.spot_pitches: 1.19 is outside 1.2 to 1.8"));
   EXPECT_EQ(warnings("/laser/spot_pitches", 1.81).size(), 1u);
   EXPECT_TRUE(warnings("/laser/spot_pitches", 1.2).empty());
   EXPECT_EQ(warnings("/paint/tone_curves", Json::array()).size(), 1u);

@@ -49,7 +49,8 @@ TEST(DaemonSettingsTest, RefusesWithTheJsonPath) {
   EXPECT_EQ(refusal(R"({"access": [{"may": "look"}]})"), "daemon.json: $.access[0].user");
   EXPECT_EQ(refusal(R"({"access": [{"user": "anna", "may": "dance"}]})"), "daemon.json: $.access[0].may");
   EXPECT_EQ(refusal(R"({"tcp": {"port": 70000, "tokens": []}})"), "daemon.json: $.tcp.port");
-  EXPECT_EQ(refusal(R"({"tcp": {"port": 1, "tokens": []}})"), "daemon.json: $.tcp.tokens") << "a door without a key";
+  EXPECT_EQ(refusal(R"({"tcp": {"port": 1, "tokens": []}})"), "daemon.json: $.tcp.tokens")
+      << "a door without a key";
   EXPECT_EQ(refusal(R"({"tcp": {"port": 1, "tokens": [{"user": "anna", "sha256": "secret"}]}})"),
             "daemon.json: $.tcp.tokens[0].sha256");
 }

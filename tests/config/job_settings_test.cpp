@@ -34,14 +34,17 @@ TEST(JobSettings, NothingGivenMeansTheDefaults) {
 }
 
 TEST(JobSettings, OrderAndFormOfWhatWasGivenDoNotChangeTheCanonicalText) {
-  EXPECT_EQ(job_settings_to_json(job_settings_from_json(R"({"seed":3,"dpi":300,"size_mm":80.0})")),
-            job_settings_to_json(job_settings_from_json(R"({"size_mm":8e1,"dots":null,"dpi":300.00,"seed":3})")));
+  EXPECT_EQ(
+      job_settings_to_json(job_settings_from_json(R"({"seed":3,"dpi":300,"size_mm":80.0})")),
+      job_settings_to_json(job_settings_from_json(R"({"size_mm":8e1,"dots":null,"dpi":300.00,"seed":3})")));
 }
 
 TEST(JobSettings, RoundTripOfRandomSettings) {
   constexpr unsigned kSeed = 5;
   std::mt19937_64 random(kSeed);
-  const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
   for (int round = 0; round < 2000; ++round) {
     JobSettings settings;
     if (random() % 2)
@@ -112,11 +115,14 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"dpi":100,"dots":1000})", "$.dots: contradicts dpi: give dpi or dots, not both"},
       {R"({"size_mm":0.5})", "$.size_mm: expected a number from 1 to 1000, found 0.5"},
       {R"({"size_mm":1001})", "$.size_mm: expected a number from 1 to 1000, found 1001"},
-      {R"({"size_mm":80,"units_mm":1})", "$.units_mm: contradicts size_mm: give size_mm or units_mm, not both"},
+      {R"({"size_mm":80,"units_mm":1})",
+       "$.units_mm: contradicts size_mm: give size_mm or units_mm, not both"},
       {R"({"up":"x"})", "$.up: expected \"y\" or \"z\", found \"x\""},
-      {R"({"untextured":"maybe"})", "$.untextured: expected \"auto\", \"blank\" or \"material\", found \"maybe\""},
+      {R"({"untextured":"maybe"})",
+       "$.untextured: expected \"auto\", \"blank\" or \"material\", found \"maybe\""},
       {R"({"sampler":"green"})",
-       "$.sampler: expected \"centroid\", \"jittered\", \"even\", \"random\", \"halton\", \"hammersley\", \"sobol\", "
+       "$.sampler: expected \"centroid\", \"jittered\", \"even\", \"random\", \"halton\", \"hammersley\", "
+       "\"sobol\", "
        "\"niederreiter\", \"blue\" or \"fine\", found \"green\""},
       {R"({"curve":"moore"})", "$.curve: expected \"hilbert\", \"peano2\" or \"laminar\", found \"moore\""},
       {R"({"curve":"laminar","sampler":"even"})",
@@ -125,7 +131,8 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
        "$.largest_gap_pitches: laminar slices have no strata to fill"},
       {R"({"dots":9,"largest_gap_pitches":1})",
        "$.largest_gap_pitches: contradicts dots: filling holes adds to their number"},
-      {R"({"largest_gap_pitches":0.5})", "$.largest_gap_pitches: expected a number from 0.7 to 100, found 0.5"},
+      {R"({"largest_gap_pitches":0.5})",
+       "$.largest_gap_pitches: expected a number from 0.7 to 100, found 0.5"},
       {R"({"density":"color"})",
        "$.density: expected \"texture\", \"mean_curvature\" or \"gaussian_curvature\", found \"color\""},
       {R"({"levels":5})", "$.levels: expected a whole number from 1 to 4, found 5"},
@@ -137,14 +144,19 @@ TEST(JobSettings, MistakesAreRefusedWithTheirPath) {
       {R"({"max_incidence_deg":46})", "$.max_incidence_deg: expected a number from 1 to 45, found 46"},
       {R"({"max_incidence_deg":30,"preferred_incidence_deg":31})",
        "$.preferred_incidence_deg: above max_incidence_deg"},
-      {R"({"planning":"slow"})", "$.planning: expected \"quality\", \"balanced\" or \"fast\", found \"slow\""},
+      {R"({"planning":"slow"})",
+       "$.planning: expected \"quality\", \"balanced\" or \"fast\", found \"slow\""},
       {R"({"order":"random"})", "$.order: expected \"improved\" or \"curve\", found \"random\""},
       {R"({"policy":"none"})", "$.policy: expected \"search\" or \"follow_normal\", found \"none\""},
-      {R"({"fixture":{"post_height_mm":-1}})", "$.fixture.post_height_mm: expected a number from 0 to 1000, found -1"},
+      {R"({"fixture":{"post_height_mm":-1}})",
+       "$.fixture.post_height_mm: expected a number from 0 to 1000, found -1"},
       {R"({"fixture":{"post":3}})", "$.fixture.post: unknown key"},
-      {R"({"mounting":{"offset_mm":[1,2]}})", "$.mounting.offset_mm: expected a list of 3 numbers, found a list of 2"},
-      {R"({"mounting":{"offset_mm":[0,0,-1]}})", "$.mounting.offset_mm: the object would stand below the post's top"},
-      {R"({"mounting":{"turn_deg":361}})", "$.mounting.turn_deg: expected a number from -360 to 360, found 361"},
+      {R"({"mounting":{"offset_mm":[1,2]}})",
+       "$.mounting.offset_mm: expected a list of 3 numbers, found a list of 2"},
+      {R"({"mounting":{"offset_mm":[0,0,-1]}})",
+       "$.mounting.offset_mm: the object would stand below the post's top"},
+      {R"({"mounting":{"turn_deg":361}})",
+       "$.mounting.turn_deg: expected a number from -360 to 360, found 361"},
       {R"({"cell":""})", "$.cell: expected a text of 1 to 4096 bytes, found 0"},
       {R"({"dry_run":"yes"})", "$.dry_run: expected true or false, found \"yes\""},
       {R"({"size_cm":8})", "$.size_cm: unknown key; did you mean \"size_mm\"?"},
@@ -163,7 +175,8 @@ TEST(JobSettings, PreferredIncidenceFollowsALowerMaximum) {
 }
 
 TEST(JobSettings, OptionsOfTheStages) {
-  const SampleOptions by_dpi = sample_options(job_settings_from_json(R"({"dpi":254,"sampler":"even","seed":9})"));
+  const SampleOptions by_dpi =
+      sample_options(job_settings_from_json(R"({"dpi":254,"sampler":"even","seed":9})"));
   EXPECT_DOUBLE_EQ(by_dpi.pitch_m.value(), 1e-4);
   EXPECT_FALSE(by_dpi.dot_count);
   EXPECT_EQ(by_dpi.sampler, Sampler::kEven);
@@ -180,8 +193,8 @@ TEST(JobSettings, OptionsOfTheStages) {
 
   const MountingOptions as_the_cell = mounting_options(JobSettings{});
   EXPECT_FALSE(as_the_cell.post_height_m || as_the_cell.post_radius_m || as_the_cell.plate_radius_m);
-  const MountingOptions mounting = mounting_options(
-      job_settings_from_json(R"({"fixture":{"post_height_mm":80},"mounting":{"offset_mm":[1,-2,3],"turn_deg":90}})"));
+  const MountingOptions mounting = mounting_options(job_settings_from_json(
+      R"({"fixture":{"post_height_mm":80},"mounting":{"offset_mm":[1,-2,3],"turn_deg":90}})"));
   EXPECT_DOUBLE_EQ(mounting.post_height_m.value(), .08);
   EXPECT_DOUBLE_EQ(mounting.offset_m[1], -.002);
   EXPECT_DOUBLE_EQ(mounting.turn, std::numbers::pi / 2);

@@ -59,9 +59,11 @@ TEST(JsonReader, EveryMistakeIsRefusedWithItsPathAndASentence) {
       {"90", "null", "f.json: $.axis.max_deg: expected a number from -720 to 720, found null"},
       {"90", "[90]", "f.json: $.axis.max_deg: expected a number from -720 to 720, found a list of 1"},
       {"max_deg", "max_rad",
-       "f.json: $.axis.max_deg: missing: expected a number from -720 to 720, found the key \"max_rad\" instead"},
+       "f.json: $.axis.max_deg: missing: expected a number from -720 to 720, found the key \"max_rad\" "
+       "instead"},
       {"max_deg", "max_dge",
-       "f.json: $.axis.max_deg: missing: expected a number from -720 to 720, found the key \"max_dge\" instead"},
+       "f.json: $.axis.max_deg: missing: expected a number from -720 to 720, found the key \"max_dge\" "
+       "instead"},
       {"{\"max_deg\":90}", "{}", "f.json: $.axis.max_deg: missing: expected a number from -720 to 720"},
       {"{\"max_deg\":90}", "3", "f.json: $.axis: expected an object, found 3"},
       {"0.5", "1.5", "f.json: $.share: expected a number from 0 to 1, found 1.5"},
@@ -85,13 +87,16 @@ TEST(JsonReader, EveryMistakeIsRefusedWithItsPathAndASentence) {
       {"[{\"radius_mm\":2}]", "[{\"radius_mm\":2},{\"radius_mm\":-2}]",
        "f.json: $.parts[1].radius_mm: expected a number from 0 to 10, found -2"},
       {"[{\"radius_mm\":2}]", "[1]", "f.json: $.parts[0]: expected an object, found 1"},
-      {"[{\"radius_mm\":2}]", "[{},{},{}]", "f.json: $.parts: expected a list of at most 2 objects, found a list of 3"},
+      {"[{\"radius_mm\":2}]", "[{},{},{}]",
+       "f.json: $.parts: expected a list of at most 2 objects, found a list of 3"},
       {"\"on\":true", "\"on\":true,\"of\":1", "f.json: $.of: unknown key"},
       {"\"on\":true", "\"on\":true,\"extar\":1", "f.json: $.extar: unknown key; did you mean \"extra\"?"},
-      {"\"on\":true", "\"on\":true,\"extra\":-1", "f.json: $.extra: expected a number of at least 0, found -1"},
+      {"\"on\":true", "\"on\":true,\"extra\":-1",
+       "f.json: $.extra: expected a number of at least 0, found -1"},
       {"\"on\":true", "\"on\":true,\"a\\u001bb\":1", "f.json: $[\"a\\u001bb\"]: unknown key"},
       {"\"on\":true", "\"on\":true,\"on\":true", "f.json: $.on: this key appears twice"},
-      {"{\"max_deg\":90}", "{\"max_deg\":90,\"max_deg\":90}", "f.json: $.axis.max_deg: this key appears twice"},
+      {"{\"max_deg\":90}", "{\"max_deg\":90,\"max_deg\":90}",
+       "f.json: $.axis.max_deg: this key appears twice"},
       {"2}", "2,\"radius_mm\":2}", "f.json: $.parts[].radius_mm: this key appears twice"},
       {"90", "1e999", "f.json: $: number overflow parsing '1e999'"},
   };
@@ -99,7 +104,8 @@ TEST(JsonReader, EveryMistakeIsRefusedWithItsPathAndASentence) {
 }
 
 TEST(JsonReader, AnOriginThatIsAPathIsContinued) {
-  EXPECT_EQ(error_of(changed("0.5", "2"), "$.settings"), "$.settings.share: expected a number from 0 to 1, found 2");
+  EXPECT_EQ(error_of(changed("0.5", "2"), "$.settings"),
+            "$.settings.share: expected a number from 0 to 1, found 2");
   EXPECT_EQ(error_of("[]", "$.settings"), "$.settings: expected an object, found a list of 0");
 }
 
@@ -140,9 +146,10 @@ TEST(JsonReader, DepthAndSizeAreLimited) {
 TEST(JsonReader, QuantitiesComeInSiUnits) {
   const auto read = [](const char* key, double value) {
     double result = 0;
-    read_json_object("{\"" + std::string(key) + "\":" + std::to_string(value) + "}", "", [&](JsonObject& json) {
-      result = json.quantity(key, {-kInfinity, kInfinity});
-    });
+    read_json_object("{\"" + std::string(key) + "\":" + std::to_string(value) + "}", "",
+                     [&](JsonObject& json) {
+                       result = json.quantity(key, {-kInfinity, kInfinity});
+                     });
     return result;
   };
   EXPECT_DOUBLE_EQ(read("max_deg", 180), std::numbers::pi);
@@ -202,7 +209,8 @@ TEST(JsonReader, MutatedBytesAreAcceptedOrRefusedAndNothingElse) {
       read_json_object(text, "", read_sample);
       ++accepted;
     } catch (const InputError& error) {
-      EXPECT_TRUE(error.at().starts_with("$")) << "seed " << kSeed << ", round " << round << ": " << error.what();
+      EXPECT_TRUE(error.at().starts_with("$"))
+          << "seed " << kSeed << ", round " << round << ": " << error.what();
       ++refused;
     }
   }

@@ -14,7 +14,8 @@
 
 namespace hilbrush::test {
 
-/// A TCP port of this machine that the system picks, and a thread that serves those who connect, one after another.
+/// A TCP port of this machine that the system picks, and a thread that serves those who connect, one after
+/// another.
 class LoopbackServer {
  public:
   /// `serve` reads a connection to its end.

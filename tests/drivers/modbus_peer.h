@@ -13,8 +13,8 @@
 
 namespace hilbrush::test {
 
-/// The other end of a Modbus TCP connection: registers that are read and written, and every write as it came over the
-/// wire, from the unit's number on. `obey` is called for each write, with all registers of its unit.
+/// The other end of a Modbus TCP connection: registers that are read and written, and every write as it came
+/// over the wire, from the unit's number on. `obey` is called for each write, with all registers of its unit.
 class ModbusPeer {
  public:
   using Registers = std::map<int, std::uint16_t>;
@@ -49,7 +49,8 @@ class ModbusPeer {
     if (::recv(connection, frame.data(), kHead, MSG_WAITALL) != static_cast<ssize_t>(kHead)) return false;
     const std::size_t length = frame[4] << 8 | frame[5];
     if (length < 2 || length > frame.size() - kHead) return false;
-    if (::recv(connection, frame.data() + kHead, length, MSG_WAITALL) != static_cast<ssize_t>(length)) return false;
+    if (::recv(connection, frame.data() + kHead, length, MSG_WAITALL) != static_cast<ssize_t>(length))
+      return false;
     std::vector<std::uint8_t> reply(frame.begin(), frame.begin() + kHead + 2);
     {
       const std::lock_guard lock(mutex_);
@@ -61,7 +62,8 @@ class ModbusPeer {
   }
 
   /// Under the lock. False: no answer.
-  bool carry_out(const std::array<std::uint8_t, 260>& frame, std::size_t length, std::vector<std::uint8_t>& reply) {
+  bool carry_out(const std::array<std::uint8_t, 260>& frame, std::size_t length,
+                 std::vector<std::uint8_t>& reply) {
     const auto word = [&](std::size_t i) { return static_cast<std::uint16_t>(frame[i] << 8 | frame[i + 1]); };
     Registers& registers = units_[frame[6]];
     const int address = word(8);

@@ -11,7 +11,8 @@ namespace {
 TEST(OrientalAz, DirectDataIsSixteenWordsHighWordFirst) {
   using oriental_az::Trigger;
   auto words = oriental_az::encode_move({-25000, 100000, 1500000}, Trigger::kAllData);
-  oriental_az::DirectData wanted{0, 0, 0, 1, 0xFFFF, 0x9E58, 1, 0x86A0, 0x16, 0xE360, 0x16, 0xE360, 0, 1000, 0, 1};
+  oriental_az::DirectData wanted{0,    0,      0,    1,      0xFFFF, 0x9E58, 1, 0x86A0,
+                                 0x16, 0xE360, 0x16, 0xE360, 0,      1000,   0, 1};
   EXPECT_EQ(words, wanted);
   EXPECT_EQ(oriental_az::kDirectDataAt, 0x58);
   EXPECT_EQ(oriental_az::kTriggerAt, 0x66);
@@ -57,10 +58,12 @@ TEST(RegisterMap, ValuesComeBackAsTheyWere) {
     reg.is_signed = random() % 2 == 0;
     reg.is_high_word_first = random() % 2 == 0;
     const auto bits = static_cast<std::uint32_t>(random());
-    const auto value = reg.words == 2 ? (reg.is_signed ? std::int64_t{static_cast<std::int32_t>(bits)} : bits)
-                                      : (reg.is_signed ? std::int64_t{static_cast<std::int16_t>(bits)} : bits & 0xFFFF);
+    const auto value = reg.words == 2
+                           ? (reg.is_signed ? std::int64_t{static_cast<std::int32_t>(bits)} : bits)
+                           : (reg.is_signed ? std::int64_t{static_cast<std::int16_t>(bits)} : bits & 0xFFFF);
     const std::uint32_t code = register_map::to_register(reg, static_cast<double>(value));
-    EXPECT_EQ(register_map::decode(reg, register_map::encode(reg, code)), value) << "seed 20261122, case " << i;
+    EXPECT_EQ(register_map::decode(reg, register_map::encode(reg, code)), value)
+        << "seed 20261122, case " << i;
   }
 }
 

@@ -31,8 +31,9 @@ class WiredAxes : public testing::TestWithParam<WireOptions::Table> {
     const RegisterMap map =
         load_register_map(std::string(kHere) + "/config/axes/" + cell.wire.endpoints().table_map + ".json");
     auto bus = std::make_shared<ModbusBus>(options[0].endpoint);
-    std::array<std::unique_ptr<AxisDrive>, 2> drives{std::make_unique<MappedDrive>(bus, options[0], map, cell.clock),
-                                                     std::make_unique<MappedDrive>(bus, options[1], map, cell.clock)};
+    std::array<std::unique_ptr<AxisDrive>, 2> drives{
+        std::make_unique<MappedDrive>(bus, options[0], map, cell.clock),
+        std::make_unique<MappedDrive>(bus, options[1], map, cell.clock)};
     table = std::make_unique<DriveGroup<2>>("table", options, std::move(drives), cell.clock);
   }
   void move(const Table::Positions& target) {
@@ -169,12 +170,14 @@ TEST(ModbusBusTest, TooManyDescriptorsAreASentence) {
   EXPECT_TRUE(bus.is_open());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Maps, WiredAxes,
-    testing::Values(WireOptions::Table::kOrientalAz, WireOptions::Table::kCia402, WireOptions::Table::kLeadshinePr),
-    [](const auto& tested) {
-      return std::string(std::array{"OrientalAz", "Cia402", "LeadshinePr"}[static_cast<std::size_t>(tested.param)]);
-    });
+INSTANTIATE_TEST_SUITE_P(Maps, WiredAxes,
+                         testing::Values(WireOptions::Table::kOrientalAz, WireOptions::Table::kCia402,
+                                         WireOptions::Table::kLeadshinePr),
+                         [](const auto& tested) {
+                           return std::string(
+                               std::array{"OrientalAz", "Cia402",
+                                          "LeadshinePr"}[static_cast<std::size_t>(tested.param)]);
+                         });
 
 }  // namespace
 }  // namespace hilbrush::test

@@ -25,8 +25,10 @@ TEST(WiredCell, PaintsDotsWithEveryAxisAtRest) {
     table_target[1] += .02 * i;
     cell.robot->move_to(target, .03);
     cell.table->move_to(table_target, .03);
-    ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position && cell.table->status().in_position; }))
-        << cell.robot->status().fault << cell.table->status().fault;
+    ASSERT_TRUE(cell.wait_for([&] {
+      return cell.robot->status().in_position && cell.table->status().in_position;
+    })) << cell.robot->status().fault
+        << cell.table->status().fault;
     for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(cell.robot->status().positions[k], target[k], 1e-4);
     cell.laser->fire(.02 + .001 * i, .005);
     ASSERT_TRUE(cell.wait_for([&] { return !cell.laser->status().is_emitting; }));

@@ -32,7 +32,8 @@ class WiredRobot : public testing::Test {
 };
 
 TEST_F(WiredRobot, TakesTargetsAheadAndArrivesAtTheLast) {
-  for (const double step : {.1, .2, .15}) cell.robot->move_to(beside(step), cell.description.timing.settle_max_s);
+  for (const double step : {.1, .2, .15})
+    cell.robot->move_to(beside(step), cell.description.timing.settle_max_s);
   ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().in_position; }));
   EXPECT_NEAR(cell.robot->status().positions[0], home[0] + .15, 1e-5);
   cell.wire.act([&](TrueCell& truth) { EXPECT_TRUE(truth.is_settled(kJ1)); });
@@ -102,7 +103,8 @@ TEST_F(WiredRobot, ALostLinkIsAFaultThatSaysWhatWasSaidLast) {
       },
       DriverError);
   ASSERT_TRUE(cell.wait_for([&] { return cell.robot->status().state == DeviceState::kFault; }));
-  EXPECT_NE(cell.robot->status().fault.find("last messages: "), std::string::npos) << cell.robot->status().fault;
+  EXPECT_NE(cell.robot->status().fault.find("last messages: "), std::string::npos)
+      << cell.robot->status().fault;
 }
 
 TEST_F(WiredRobot, ALinkThatIsLostAtRestIsAFaultThatCanBeCleared) {

@@ -11,8 +11,8 @@
 #include "drivers/steady_clock.h"
 #include "tests/drivers/modbus_peer.h"
 
-/// The set-point that goes ahead of a move while light is on: which bytes, that nothing moves by them, and that
-/// whatever comes between makes the next order a whole one.
+/// The set-point that goes ahead of a move while light is on: which bytes, that nothing moves by them, and
+/// that whatever comes between makes the next order a whole one.
 namespace hilbrush::test {
 namespace {
 
@@ -94,18 +94,20 @@ class OrientalAhead : public testing::Test {
   static constexpr std::uint16_t kInPlace = oriental_az::kInPosition | oriental_az::kReady;
   /// 0.1 rad are 1,000 steps; 10,000 steps/s, 100,000 steps/s2.
   static constexpr const char* kWhole =
-      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 03 E8 00 00 27 10 00 01 86 A0 00 01 86 A0 00 00 03 E8 "
+      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 03 E8 00 00 27 10 00 01 86 A0 00 01 86 A0 00 00 03 "
+      "E8 "
       "00 00 00 01";
   static constexpr const char* kAhead =
-      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 03 E8 00 00 27 10 00 01 86 A0 00 01 86 A0 00 00 03 E8 "
+      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 03 E8 00 00 27 10 00 01 86 A0 00 01 86 A0 00 00 03 "
+      "E8 "
       "00 00 00 00";
   static constexpr const char* kTrigger = "01 10 00 66 00 02 04 00 00 00 01";
 
   ModbusPeer peer{obey};
   SteadyClock clock;
-  std::unique_ptr<DriveGroup<2>> table = make_group(peer.port(), clock, [](const auto& bus, const auto& options) {
-    return std::make_unique<OrientalDrive>(bus, options);
-  });
+  std::unique_ptr<DriveGroup<2>> table = make_group(
+      peer.port(), clock,
+      [](const auto& bus, const auto& options) { return std::make_unique<OrientalDrive>(bus, options); });
 };
 
 TEST_F(OrientalAhead, DataGoAheadWithTheTriggerAtNoneAndTheTriggerAloneStarts) {

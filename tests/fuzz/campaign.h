@@ -15,8 +15,8 @@ inline volatile std::uint64_t current_seed = 0;
 
 inline void report_crash(int signal) {
   char text[120];
-  const int length = std::snprintf(text, sizeof text, "signal %d while reading the mutant of seed %llu\n", signal,
-                                   static_cast<unsigned long long>(current_seed));
+  const int length = std::snprintf(text, sizeof text, "signal %d while reading the mutant of seed %llu\n",
+                                   signal, static_cast<unsigned long long>(current_seed));
   if (length > 0 && ::write(STDERR_FILENO, text, static_cast<std::size_t>(length)) < 0) ::_exit(3);
   std::signal(signal, SIG_DFL);
   std::raise(signal);

@@ -35,7 +35,8 @@ inline void decode_as_robot(std::string_view bytes) {
     frames.push(piece);
     while (const auto frame = frames.next()) {
       ++whole;
-      for (std::size_t i = 0; i < 4; ++i) promise(std::isfinite(frame->actual[i]) && std::isfinite(frame->setpoint[i]));
+      for (std::size_t i = 0; i < 4; ++i)
+        promise(std::isfinite(frame->actual[i]) && std::isfinite(frame->setpoint[i]));
       dobot::mode_name(frame->mode);
     }
   }
@@ -98,7 +99,8 @@ inline void decode_as_drive(std::string_view bytes) {
   reg.is_high_word_first = (bytes[9] & 2) != 0;
   const std::int64_t value = register_map::decode(reg, std::span(position).first(2));
   promise(register_map::decode(
-              reg, register_map::encode(reg, register_map::to_register(reg, static_cast<double>(value)))) == value);
+              reg, register_map::encode(reg, register_map::to_register(reg, static_cast<double>(value)))) ==
+          value);
 }
 
 }  // namespace device_codecs

@@ -9,7 +9,8 @@
 #include "tests/fuzz/device_codecs.h"
 #include "tests/fuzz/mutator.h"
 
-/// Seeded mutants of what devices send. HILBRUSH_FUZZ_INPUTS is their number, HILBRUSH_FUZZ_SEED the first seed.
+/// Seeded mutants of what devices send. HILBRUSH_FUZZ_INPUTS is their number, HILBRUSH_FUZZ_SEED the first
+/// seed.
 namespace hilbrush {
 namespace {
 

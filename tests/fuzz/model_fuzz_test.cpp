@@ -16,9 +16,9 @@
 #include "tests/fuzz/opened_files.h"
 #include "tests/fuzz/playground.h"
 
-/// Seeded mutants of the corpus, read as an operator's files would be. None may crash, take more than 5 s, need more
-/// than 1 GB, or make the readers open a file outside the model's folder. HILBRUSH_FUZZ_INPUTS is the number of
-/// mutants, HILBRUSH_FUZZ_SEED the first seed.
+/// Seeded mutants of the corpus, read as an operator's files would be. None may crash, take more than 5 s,
+/// need more than 1 GB, or make the readers open a file outside the model's folder. HILBRUSH_FUZZ_INPUTS is
+/// the number of mutants, HILBRUSH_FUZZ_SEED the first seed.
 namespace hilbrush {
 namespace {
 
@@ -35,7 +35,8 @@ constexpr bool kIsSanitized = false;
 
 using Clock = std::chrono::steady_clock;
 
-/// Processor time: nothing here waits, so it is what an operator would wait on an idle machine, even on a busy one.
+/// Processor time: nothing here waits, so it is what an operator would wait on an idle machine, even on a
+/// busy one.
 double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
@@ -114,39 +115,41 @@ void expect_sound(const TexturedMesh& mesh, std::uint64_t seed) {
 
 TEST(ModelFuzz, MutatedModelsNeitherCrashNorHangNorReadOutsideTheirFolder) {
   const Playground playground;
-  (void)load_image_file(playground.folder() / "gradient.png", 1 << 20);  // so that OpenImageIO opens its own files now
+  (void)load_image_file(playground.folder() / "gradient.png",
+                        1 << 20);  // so that OpenImageIO opens its own files now
   std::size_t read_count = 0;
-  run_campaign(playground.models(), 25, [&](const std::string& name, const std::string& mutant, std::uint64_t seed) {
-    const fs::path file = playground.write(name, mutant);
-    const ImageReader reader = [&](const fs::path& image, std::size_t limit) {
-      EXPECT_TRUE(is_below(fs::canonical(image), playground.folder())) << image << " seed " << seed;
-      return load_image_file(image, limit);
-    };
-    std::vector<std::string> opened;
-    try {
-      const OpenedFiles watcher;
-      const auto note_names = [&] { opened = watcher.names(); };
-      try {
-        const Model model = load_model(file, reader);
-        note_names();
-        expect_sound(model.mesh, seed);
-        ++read_count;
-        for (const fs::path& used : model.files)
-          EXPECT_TRUE(is_below(fs::canonical(used), playground.folder())) << used << " seed " << seed;
-      } catch (const InputError&) {
-        note_names();
-        throw;
-      }
-    } catch (const InputError& error) {
-      EXPECT_FALSE(error.sentence().empty());
-    }
-    EXPECT_FALSE(opened.empty()) << "the watcher saw nothing";
-    for (const std::string& used : opened) {
-      std::error_code ignored;
-      const fs::path real = fs::canonical(used, ignored);
-      EXPECT_TRUE(ignored || is_below(real, playground.folder())) << used << " seed " << seed;
-    }
-  });
+  run_campaign(
+      playground.models(), 25, [&](const std::string& name, const std::string& mutant, std::uint64_t seed) {
+        const fs::path file = playground.write(name, mutant);
+        const ImageReader reader = [&](const fs::path& image, std::size_t limit) {
+          EXPECT_TRUE(is_below(fs::canonical(image), playground.folder())) << image << " seed " << seed;
+          return load_image_file(image, limit);
+        };
+        std::vector<std::string> opened;
+        try {
+          const OpenedFiles watcher;
+          const auto note_names = [&] { opened = watcher.names(); };
+          try {
+            const Model model = load_model(file, reader);
+            note_names();
+            expect_sound(model.mesh, seed);
+            ++read_count;
+            for (const fs::path& used : model.files)
+              EXPECT_TRUE(is_below(fs::canonical(used), playground.folder())) << used << " seed " << seed;
+          } catch (const InputError&) {
+            note_names();
+            throw;
+          }
+        } catch (const InputError& error) {
+          EXPECT_FALSE(error.sentence().empty());
+        }
+        EXPECT_FALSE(opened.empty()) << "the watcher saw nothing";
+        for (const std::string& used : opened) {
+          std::error_code ignored;
+          const fs::path real = fs::canonical(used, ignored);
+          EXPECT_TRUE(ignored || is_below(real, playground.folder())) << used << " seed " << seed;
+        }
+      });
   EXPECT_GT(read_count, 0u);
 }
 
@@ -160,17 +163,19 @@ TEST(ModelFuzz, TheCorpusItselfIsRead) {
 
 TEST(ImageFuzz, MutatedImagesNeitherCrashNorHang) {
   const Playground playground;
-  run_campaign(playground.images(), 10, [&](const std::string& name, const std::string& mutant, std::uint64_t seed) {
-    const auto texture = load_image_file(playground.write(name, mutant), 1 << 22);
-    if (!texture) {
-      EXPECT_FALSE(texture.reason().empty()) << "seed " << seed;
-      return;
-    }
-    ASSERT_EQ(texture->luminance.size(),
-              static_cast<std::size_t>(texture->width) * static_cast<std::size_t>(texture->height))
-        << "seed " << seed;
-    for (const float value : texture->luminance) ASSERT_TRUE(value >= 0 && value <= 1.0001f) << "seed " << seed;
-  });
+  run_campaign(
+      playground.images(), 10, [&](const std::string& name, const std::string& mutant, std::uint64_t seed) {
+        const auto texture = load_image_file(playground.write(name, mutant), 1 << 22);
+        if (!texture) {
+          EXPECT_FALSE(texture.reason().empty()) << "seed " << seed;
+          return;
+        }
+        ASSERT_EQ(texture->luminance.size(),
+                  static_cast<std::size_t>(texture->width) * static_cast<std::size_t>(texture->height))
+            << "seed " << seed;
+        for (const float value : texture->luminance)
+          ASSERT_TRUE(value >= 0 && value <= 1.0001f) << "seed " << seed;
+      });
 }
 
 }  // namespace

@@ -6,8 +6,9 @@
 
 namespace hilbrush {
 
-/// Damages files the way bad disks, careless exporters and attackers do: bits, bytes, numbers, words and blocks are
-/// changed, cut, copied and mixed with other files. The same seed makes the same bytes on every machine.
+/// Damages files the way bad disks, careless exporters and attackers do: bits, bytes, numbers, words and
+/// blocks are changed, cut, copied and mixed with other files. The same seed makes the same bytes on every
+/// machine.
 class Mutator {
  public:
   /// @param donors  files to take pieces from
@@ -20,7 +21,9 @@ class Mutator {
 
  private:
   void mutate_once(std::string& text);
-  std::size_t below(std::size_t limit) { return limit == 0 ? 0 : static_cast<std::size_t>(random_() % limit); }
+  std::size_t below(std::size_t limit) {
+    return limit == 0 ? 0 : static_cast<std::size_t>(random_() % limit);
+  }
   void replace_number(std::string& text);
   void replace_word(std::string& text);
   void copy_block(std::string& text);

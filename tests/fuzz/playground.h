@@ -15,8 +15,8 @@
 
 namespace hilbrush {
 
-/// A folder to read mutants in, with everything that they may name: the corpus, images and links that lead out of it
-/// inside, and files outside that must not be read. Removed at the end.
+/// A folder to read mutants in, with everything that they may name: the corpus, images and links that lead
+/// out of it inside, and files outside that must not be read. Removed at the end.
 class Playground {
  public:
   /// @throws std::filesystem::filesystem_error if it cannot be made
@@ -62,9 +62,9 @@ inline std::string tga() {
   return std::string("\0\0\2\0\0\0\0\0\0\0\0\0", 12) + little(4, 2) + little(2, 2) + "\x18\x20" + pixels();
 }
 inline std::string bmp() {
-  return "BM" + little(54 + 24, 4) + little(0, 4) + little(54, 4) + little(40, 4) + little(4, 4) + little(2, 4) +
-         little(1, 2) + little(24, 2) + little(0, 4) + little(24, 4) + little(2835, 4) + little(2835, 4) +
-         little(0, 4) + little(0, 4) + pixels();
+  return "BM" + little(54 + 24, 4) + little(0, 4) + little(54, 4) + little(40, 4) + little(4, 4) +
+         little(2, 4) + little(1, 2) + little(24, 2) + little(0, 4) + little(24, 4) + little(2835, 4) +
+         little(2835, 4) + little(0, 4) + little(0, 4) + pixels();
 }
 inline std::string tiff() {
   std::string out = "II" + little(42, 2) + little(8, 4);
@@ -78,7 +78,8 @@ inline std::string tiff() {
                                                           {278, 4, 2},
                                                           {279, 4, 24}}};
   out += little(static_cast<std::uint32_t>(tags.size()), 2);
-  for (const auto& [tag, type, value] : tags) out += little(tag, 2) + little(type, 2) + little(1, 4) + little(value, 4);
+  for (const auto& [tag, type, value] : tags)
+    out += little(tag, 2) + little(type, 2) + little(1, 4) + little(value, 4);
   return out + little(0, 4) + pixels();
 }
 /// Two colors, 2 x 2, one code a pixel.
@@ -99,8 +100,8 @@ inline std::string bytes_of(const std::filesystem::path& file) {
 
 inline Playground::Playground() {
   std::filesystem::create_directories(folder_);
-  for (const auto& entry :
-       std::filesystem::directory_iterator(std::filesystem::path(HILBRUSH_SOURCE_DIR) / "tests/fuzz/corpus/models")) {
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(HILBRUSH_SOURCE_DIR) /
+                                                               "tests/fuzz/corpus/models")) {
     models_[entry.path().filename().string()] = bytes_of(entry.path());
     std::filesystem::copy_file(entry.path(), folder_ / entry.path().filename());
   }

@@ -13,8 +13,8 @@
 
 /// The guides tell the truth: what they name exists, and what they tell to run runs.
 ///
-/// A block that begins with ```sh is run, in the order of its guide, from a folder that looks like a built checkout.
-/// One that begins with ```sh by-hand is not: it needs hardware, root, or too much time.
+/// A block that begins with ```sh is run, in the order of its guide, from a folder that looks like a built
+/// checkout. One that begins with ```sh by-hand is not: it needs hardware, root, or too much time.
 namespace hilbrush::guides {
 namespace fs = std::filesystem;
 using namespace testing_support;
@@ -63,7 +63,8 @@ std::string script_of(const std::vector<std::string>& commands) {
       "set -euo pipefail\n"
       "end() { code=$?; trap - EXIT; kill $(jobs -p) 2>/dev/null || true; wait; exit $code; }\n"
       "trap end EXIT\n"
-      "wait_until() { for i in $(seq 300); do \"$@\" >/dev/null 2>&1 && return; sleep 0.1; done; return 1; }\n"
+      "wait_until() { for i in $(seq 300); do \"$@\" >/dev/null 2>&1 && return; sleep 0.1; done; return 1; "
+      "}\n"
       "set -x\n";
   for (const std::string& command : commands) {
     script += command + "\n";
@@ -74,9 +75,11 @@ std::string script_of(const std::vector<std::string>& commands) {
 
 /// A folder that looks like the checkout after a build, and takes what the commands write.
 void lay_out_checkout(const fs::path& folder) {
-  for (const char* name : {"config", "sim", "tests"}) fs::create_directory_symlink(kTop / name, folder / name);
+  for (const char* name : {"config", "sim", "tests"})
+    fs::create_directory_symlink(kTop / name, folder / name);
   fs::create_directory(folder / "build");
-  for (const char* program : {"hilbrush", "hilbrushd", "hilbrush-pipeline", "hilbrush-laserguard", "hilbrush-simcell"})
+  for (const char* program :
+       {"hilbrush", "hilbrushd", "hilbrush-pipeline", "hilbrush-laserguard", "hilbrush-simcell"})
     fs::create_symlink(kBuild / program, folder / "build" / program);
 }
 
@@ -109,8 +112,8 @@ TEST_P(Guide, CommandsRun) {
   const TemporaryFolder folder;
   lay_out_checkout(folder.path());
   const std::string script = folder.write("guide.sh", script_of(commands));
-  const CommandResult result =
-      run_command("cd " + quoted(folder.path().string()) + " && timeout 300 bash " + quoted(script) + " 2>&1");
+  const CommandResult result = run_command("cd " + quoted(folder.path().string()) + " && timeout 300 bash " +
+                                           quoted(script) + " 2>&1");
   EXPECT_EQ(result.exit_code, 0) << GetParam() << "\n" << result.output;
 }
 

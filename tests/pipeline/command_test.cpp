@@ -29,7 +29,8 @@ std::string cube() {
 TEST(Command, DryRunMakesTheReportAndThePictures) {
   const TemporaryFolder folder;
   const fs::path out = folder.path() / "made/by/the command";
-  const CommandResult result = hilbrush("dry-run " + cube() + " --size-mm 20 --dpi 50 -o " + quoted(out.string()));
+  const CommandResult result =
+      hilbrush("dry-run " + cube() + " --size-mm 20 --dpi 50 -o " + quoted(out.string()));
   ASSERT_EQ(result.exit_code, 0) << result.output;
   EXPECT_NE(result.output.find("exposure.png"), std::string::npos) << "it says where the pictures are:\n"
                                                                    << result.output;
@@ -55,8 +56,8 @@ TEST(Command, AMissingTextureIsAWarningThatNamesIt) {
   const CommandResult result =
       hilbrush("plan " + quoted((folder.path() / "letter_cube.obj").string()) +
                " --size-mm 20 --dpi 50 --untextured material -o " + quoted((folder.path() / "out").string()));
-  // The material is white: without its picture nothing is left to paint, which is refused as bad input; with it named
-  // either way.
+  // The material is white: without its picture nothing is left to paint, which is refused as bad input; with
+  // it named either way.
   EXPECT_TRUE(result.exit_code == 0 || result.exit_code == 3) << result.exit_code << "\n" << result.output;
   EXPECT_NE(result.output.find("letter_cube.png"), std::string::npos) << result.output;
 }
@@ -90,14 +91,16 @@ TEST(Command, BadInputIsThreeAndSaysWhere) {
       {"dry-run /no/such/model.wrl --size-mm 20" + out, "/no/such/model.wrl"},
       {"dry-run " + quoted(broken) + " --size-mm 20" + out, "broken.wrl:"},
       {"dry-run " + quoted(empty) + " --size-mm 20" + out, "empty.obj"},
-      {"dry-run " + quoted(folder.path().string()) + " --size-mm 20" + out, folder.path().filename().string()},
+      {"dry-run " + quoted(folder.path().string()) + " --size-mm 20" + out,
+       folder.path().filename().string()},
       {"dry-run " + quoted(test_data("letter_cube.obj").string()) + out, "size"},
       {"dry-run " + cube() + " --size-mm -5" + out, "size"},
       {"dry-run " + cube() + " --size-mm 20 --cell no_such_cell" + out, "no_such_cell"},
       {"dry-run " + cube() + " --size-mm 20 --sampler neat" + out, "sampler"},
       {"dry-run " + cube() + " --size-mm 20 --dpi 50 -o " + quoted((folder.path() / "a_file/below").string()),
        "a_file"},
-      {"develop " + cube() + " --program /no/program.ply --emissions /no/emissions.ply" + out, "/no/program.ply"}};
+      {"develop " + cube() + " --program /no/program.ply --emissions /no/emissions.ply" + out,
+       "/no/program.ply"}};
   for (const Case& each : cases) {
     const CommandResult result = hilbrush(each.arguments);
     EXPECT_EQ(result.exit_code, 3) << each.arguments << "\n" << result.output;
@@ -115,8 +118,8 @@ TEST(Command, ADamagedProgramOrRecordIsBadInputAndNamedOnce) {
   std::ofstream(record) << "not a record";
   const std::string rest = " -o " + quoted((folder.path() / "out").string());
   const auto expect_refused = [&](const std::string& program, const std::string& named) {
-    const CommandResult result = hilbrush("develop " + cube() + " --size-mm 20 --dpi 30 --program " + quoted(program) +
-                                          " --emissions " + quoted(record) + rest);
+    const CommandResult result = hilbrush("develop " + cube() + " --size-mm 20 --dpi 30 --program " +
+                                          quoted(program) + " --emissions " + quoted(record) + rest);
     EXPECT_EQ(result.exit_code, 3) << result.output;
     const auto first = result.output.find(named);
     EXPECT_NE(first, std::string::npos) << result.output;
@@ -169,13 +172,15 @@ TEST(Command, WithoutADaemonItSaysSo) {
 TEST(Programs, AnswerHelpAndVersion) {
   for (const char* program : {"hilbrush", "hilbrushd", "hilbrush-pipeline"}) {
     for (const char* flag : {"--help", "--version"}) {
-      const CommandResult result = run_command(quoted(std::string(HILBRUSH_BUILD_DIR) + "/" + program) + " " + flag);
+      const CommandResult result =
+          run_command(quoted(std::string(HILBRUSH_BUILD_DIR) + "/" + program) + " " + flag);
       EXPECT_EQ(result.exit_code, 0) << program << " " << flag << "\n" << result.output;
       EXPECT_FALSE(result.output.empty()) << program << " " << flag;
     }
   }
-  for (const char* command : {"dry-run", "plan", "develop", "calibrate", "submit", "watch", "list", "get", "start",
-                              "pause", "resume", "cancel", "status", "stop", "clear", "arm", "home", "check-config"}) {
+  for (const char* command :
+       {"dry-run", "plan", "develop", "calibrate", "submit", "watch", "list", "get", "start", "pause",
+        "resume", "cancel", "status", "stop", "clear", "arm", "home", "check-config"}) {
     for (const char* flag : {"--help", "--version"}) {
       const CommandResult result = hilbrush(std::string(command) + " " + flag);
       EXPECT_EQ(result.exit_code, 0) << command << " " << flag << "\n" << result.output;

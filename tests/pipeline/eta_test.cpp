@@ -15,7 +15,8 @@ namespace {
 using namespace testing_pipeline;
 
 /// From home to home on the simulated cell; `truth` is what it is, `description` what it is thought to be.
-ExecutionResult painted(const ExposureProgram& program, const CellDescription& description, CellDescription truth) {
+ExecutionResult painted(const ExposureProgram& program, const CellDescription& description,
+                        CellDescription truth) {
   truth.simulation.time_scale = 0;
   SimCell sim(truth);
   const Cell cell = sim.cell();
@@ -64,7 +65,8 @@ INSTANTIATE_TEST_SUITE_P(AllPlans, Eta,
                          testing::Values(EtaCase{"Fast", Planning::kFast, PosePolicy::kSearch, 30},
                                          EtaCase{"Balanced", Planning::kBalanced, PosePolicy::kSearch, 20},
                                          EtaCase{"Quality", Planning::kQuality, PosePolicy::kSearch, 20},
-                                         EtaCase{"Follow", Planning::kBalanced, PosePolicy::kFollowNormal, 20}),
+                                         EtaCase{"Follow", Planning::kBalanced, PosePolicy::kFollowNormal,
+                                                 20}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 TEST(MeasuredMotion, OfTheCellThatItIsThoughtToBeIsNothing) {
@@ -91,7 +93,8 @@ TEST(MeasuredMotion, OfASlowerCellMakesTheEstimateTrue) {
   const auto measured = result.motion.measured();
   ASSERT_TRUE(measured);
   const double estimate_s = estimate_time(with_measured(*measured), painting.program).total_s();
-  EXPECT_NEAR(estimate_s / result.elapsed_s, 1, .02) << estimate_s << " s against " << result.elapsed_s << " s";
+  EXPECT_NEAR(estimate_s / result.elapsed_s, 1, .02)
+      << estimate_s << " s against " << result.elapsed_s << " s";
 }
 
 }  // namespace

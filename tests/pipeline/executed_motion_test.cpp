@@ -31,7 +31,8 @@ TEST(ExecutedMotion, KeepsLimitsAndClearanceOnEveryTick) {
 
   PlacementOptions placement;
   placement.size_m = .06;
-  const TexturedMesh mesh = repair_mesh(place_on_table(load_model(request.model, load_image_file), placement)).mesh;
+  const TexturedMesh mesh =
+      repair_mesh(place_on_table(load_model(request.model, load_image_file), placement)).mesh;
   const CheckCell check(mesh, description);
   SimCell sim(description, {.laser_start_delay_s = 0});
   bring_up(sim.cell());
@@ -57,17 +58,21 @@ TEST(ExecutedMotion, TheWitnessSeesWhatBreaksALimit) {
     tighten(tighter);
     TickWitness witness(sim, tighter);
     Joints away;
-    for (std::size_t i = 0; i < kAxisCount; ++i) away[i] = .5 * (description.axes[i].home + description.axes[i].max);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      away[i] = .5 * (description.axes[i].home + description.axes[i].max);
     ExecutionControl control;
     const ExecutionResult result = travel({away}, witness.cell(), description, control);
     EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
     return witness.first_fault();
   };
   EXPECT_EQ(fault_with([](CellDescription&) {}), "");
-  EXPECT_TRUE(fault_with([](CellDescription& c) { c.axes[kJ2].speed_max *= .99; }).starts_with("j2 is faster"));
   EXPECT_TRUE(
-      fault_with([](CellDescription& c) { c.axes[kTilt].acceleration_max *= .9; }).starts_with("a accelerates"));
-  EXPECT_TRUE(fault_with([](CellDescription& c) { c.axes[kRotation].max = .01; }).starts_with("c is outside"));
+      fault_with([](CellDescription& c) { c.axes[kJ2].speed_max *= .99; }).starts_with("j2 is faster"));
+  EXPECT_TRUE(fault_with([](CellDescription& c) {
+                c.axes[kTilt].acceleration_max *= .9;
+              }).starts_with("a accelerates"));
+  EXPECT_TRUE(
+      fault_with([](CellDescription& c) { c.axes[kRotation].max = .01; }).starts_with("c is outside"));
 }
 
 }  // namespace

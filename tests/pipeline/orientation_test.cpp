@@ -8,10 +8,10 @@
 
 #include "tests/pipeline/painting.h"
 
-/// A letter on each face of a cube, read back from the film: a picture that is turned, mirrored, or on the wrong face
-/// cannot pass. What the test knows is the cube as tests/data/make_cubes.py describes it, and the rule that texture
-/// coordinates start at the image's lower left corner in VRML97 (6.46), OBJ and PLY alike. It looks at the film through
-/// a plain box of its own: no reader, no texture and no sampling is trusted.
+/// A letter on each face of a cube, read back from the film: a picture that is turned, mirrored, or on the
+/// wrong face cannot pass. What the test knows is the cube as tests/data/make_cubes.py describes it, and the
+/// rule that texture coordinates start at the image's lower left corner in VRML97 (6.46), OBJ and PLY alike.
+/// It looks at the film through a plain box of its own: no reader, no texture and no sampling is trusted.
 namespace hilbrush::testing_pipeline {
 namespace {
 
@@ -24,8 +24,8 @@ struct Stroke {
   double x0, y0, x1, y1;
 };
 
-/// One tile of letter_cube.png as strokes, in pixels from the tile's upper left corner: the letter, and the face's
-/// number beside it.
+/// One tile of letter_cube.png as strokes, in pixels from the tile's upper left corner: the letter, and the
+/// face's number beside it.
 constexpr double kTilePixels = 96;
 const std::vector<Stroke> kLetter{{18, 80, 18, 16}, {18, 16, 56.4, 16}, {18, 46.7, 46.8, 46.7}};
 const std::array<std::vector<Stroke>, 6> kNumbers{{
@@ -67,16 +67,17 @@ Bitmap drawn(const std::vector<Stroke>& strokes, double width_pixels) {
     for (int column = 0; column < kGrid; ++column) {
       const double x = kTilePixels * (column + .5) / kGrid;
       const double y = kTilePixels * (1 - (row + .5) / kGrid);
-      const bool is_dark = std::any_of(strokes.begin(), strokes.end(),
-                                       [&](const Stroke& s) { return distance(s, x, y) <= width_pixels / 2; });
+      const bool is_dark = std::any_of(strokes.begin(), strokes.end(), [&](const Stroke& s) {
+        return distance(s, x, y) <= width_pixels / 2;
+      });
       bitmap.push_back(is_dark ? 1 : 0);
     }
   }
   return bitmap;
 }
 
-/// The eight ways a square picture can lie on a square: 0 as it should; 1, 2, 3 turned by quarters; 4..7 the same,
-/// mirrored.
+/// The eight ways a square picture can lie on a square: 0 as it should; 1, 2, 3 turned by quarters; 4..7 the
+/// same, mirrored.
 Bitmap transformed(const Bitmap& bitmap, int variant) {
   Bitmap result(bitmap.size());
   for (int row = 0; row < kGrid; ++row) {
@@ -88,7 +89,8 @@ Bitmap transformed(const Bitmap& bitmap, int variant) {
         r = c;
         c = kGrid - 1 - old_r;
       }
-      result[static_cast<std::size_t>(r * kGrid + c)] = bitmap[static_cast<std::size_t>(row * kGrid + column)];
+      result[static_cast<std::size_t>(r * kGrid + c)] =
+          bitmap[static_cast<std::size_t>(row * kGrid + column)];
     }
   }
   return result;
@@ -161,7 +163,8 @@ struct Reading {
 Reading read_letter(const Bitmap& bitmap) {
   static const Bitmap letter = drawn(kLetter, 11);
   Reading reading;
-  reading.is_painted = std::accumulate(bitmap.begin(), bitmap.end(), 0.) / static_cast<double>(bitmap.size()) > .03;
+  reading.is_painted =
+      std::accumulate(bitmap.begin(), bitmap.end(), 0.) / static_cast<double>(bitmap.size()) > .03;
   double best = -1;
   for (int variant = 0; variant < 8; ++variant) {
     const double fit = correlation(bitmap, transformed(letter, variant));
@@ -174,7 +177,8 @@ Reading read_letter(const Bitmap& bitmap) {
   // The number's corner: right of the letter, below its middle.
   std::vector<bool> is_corner;
   for (int row = 0; row < kGrid; ++row)
-    for (int column = 0; column < kGrid; ++column) is_corner.push_back(column > .62 * kGrid && row < .5 * kGrid);
+    for (int column = 0; column < kGrid; ++column)
+      is_corner.push_back(column > .62 * kGrid && row < .5 * kGrid);
   best = -1;
   for (std::size_t k = 0; k < kNumbers.size(); ++k) {
     const double fit = correlation(bitmap, drawn(kNumbers[k], 5), is_corner);
@@ -185,8 +189,8 @@ Reading read_letter(const Bitmap& bitmap) {
   return reading;
 }
 
-/// Paints the cube with `up` as its upward axis and reads every face. Returns the numbers of the faces that were
-/// painted.
+/// Paints the cube with `up` as its upward axis and reads every face. Returns the numbers of the faces that
+/// were painted.
 std::vector<int> paint_and_read(const std::string& file, const char* up) {
   JobSettings settings;
   settings.size_mm = kSide_m * 1e3;
@@ -207,8 +211,8 @@ std::vector<int> paint_and_read(const std::string& file, const char* up) {
     const Eigen::Vector3d normal_O = in_object(kFaces[k].normal_F);
     const Reading reading =
         read_letter(read_face(film, normal_O, in_object(kFaces[k].right_F), in_object(kFaces[k].up_F)));
-    // The face that the cube stands on is reached from below as far as the table tilts: what is there must be right,
-    // but needs not be there.
+    // The face that the cube stands on is reached from below as far as the table tilts: what is there must be
+    // right, but needs not be there.
     const bool is_underside = normal_O.z() < -.5;
     EXPECT_TRUE(reading.is_painted || is_underside) << file << ", " << up << " up: " << kFaces[k].name;
     if (!reading.is_painted) continue;
@@ -217,7 +221,8 @@ std::vector<int> paint_and_read(const std::string& file, const char* up) {
                                        << " lies in variant " << reading.best_variant;
     if (is_underside) continue;
     EXPECT_GT(reading.as_it_should, .75) << file << ", " << up << " up: " << kFaces[k].name;
-    EXPECT_GT(reading.as_it_should, reading.best_other + .3) << file << ", " << up << " up: " << kFaces[k].name;
+    EXPECT_GT(reading.as_it_should, reading.best_other + .3)
+        << file << ", " << up << " up: " << kFaces[k].name;
     EXPECT_EQ(reading.number, static_cast<int>(k) + 1)
         << file << ", " << up << " up: the " << kFaces[k].name << " shows another face's picture";
   }
@@ -234,17 +239,19 @@ TEST_P(Orientation, LettersStandUprightAndUnmirroredOnEveryFace) {
   EXPECT_GE(tipped.size(), 5u);
   painted.insert(painted.end(), tipped.begin(), tipped.end());
   for (int k = 1; k <= 6; ++k)
-    EXPECT_NE(std::find(painted.begin(), painted.end(), k), painted.end()) << "face " << k << " was never painted";
+    EXPECT_NE(std::find(painted.begin(), painted.end(), k), painted.end())
+        << "face " << k << " was never painted";
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, Orientation, testing::Values("letter_cube.wrl", "letter_cube.obj", "letter_cube.ply"),
+INSTANTIATE_TEST_SUITE_P(Formats, Orientation,
+                         testing::Values("letter_cube.wrl", "letter_cube.obj", "letter_cube.ply"),
                          [](const auto& each) {
                            return std::string(each.param).substr(std::string("letter_cube.").size());
                          });
 
 TEST(OrientationTest, WouldSeeEveryOtherWay) {
-  // This tests the test itself: a letter that lies in any of the other seven ways, or another number, is distinguished
-  // from the right one.
+  // This tests the test itself: a letter that lies in any of the other seven ways, or another number, is
+  // distinguished from the right one.
   for (int variant = 0; variant < 8; ++variant) {
     std::vector<Stroke> strokes = kLetter;
     Bitmap bitmap = drawn(strokes, 11);
@@ -261,8 +268,8 @@ TEST(OrientationTest, WouldSeeEveryOtherWay) {
 }
 
 TEST(Colors, EachFaceIsPaintedInItsOwnGray) {
-  // face_colors.wrl: colorIndex [3 1 4 0 2 5] of the grays 0, .2, .4, .6, .8, 1, sRGB-encoded, for the faces in the
-  // order above.
+  // face_colors.wrl: colorIndex [3 1 4 0 2 5] of the grays 0, .2, .4, .6, .8, 1, sRGB-encoded, for the faces
+  // in the order above.
   JobSettings settings;
   settings.size_mm = kSide_m * 1e3;
   settings.dpi = 100;

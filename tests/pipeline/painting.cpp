@@ -25,7 +25,8 @@ fs::path test_data(const std::string& name) {
 
 namespace {
 
-std::vector<Emission> run_on_simulated_cell(const ExposureProgram& program, const CellDescription& description) {
+std::vector<Emission> run_on_simulated_cell(const ExposureProgram& program,
+                                            const CellDescription& description) {
   SimCell sim(description);
   std::vector<Emission> emissions;
   sim.set_emission_sink([&](const Emission& emission) { emissions.push_back(emission); });
@@ -82,7 +83,8 @@ TexturedMesh plain_box(const Eigen::Vector3d& size_m) {
   TexturedMesh mesh;
   const Eigen::Vector3d half = size_m / 2;
   for (int i = 0; i < 8; ++i)
-    mesh.vertices.emplace_back(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(), i & 4 ? size_m.z() : 0.);
+    mesh.vertices.emplace_back(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(),
+                               i & 4 ? size_m.z() : 0.);
   const std::array<std::array<std::uint32_t, 4>, 6> quads{
       {{1, 3, 7, 5}, {0, 4, 6, 2}, {2, 6, 7, 3}, {0, 1, 5, 4}, {4, 5, 7, 6}, {0, 2, 3, 1}}};
   for (const auto& q : quads) {

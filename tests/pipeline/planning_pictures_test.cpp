@@ -10,14 +10,16 @@
 namespace hilbrush {
 namespace {
 
-/// A plate of 40 mm, seen from the top, with 20 x 20 dots; `skipped` of them, the rest exposed along the normal.
+/// A plate of 40 mm, seen from the top, with 20 x 20 dots; `skipped` of them, the rest exposed along the
+/// normal.
 struct PlannedPlate {
   explicit PlannedPlate(std::size_t skipped_count, SkipReason reason) {
     mesh.vertices = {{-.02, -.02, 0}, {.02, -.02, 0}, {.02, .02, 0}, {-.02, .02, 0}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
     dots.pitch_m = .002;
     for (int y = 0; y < 20; ++y)
-      for (int x = 0; x < 20; ++x) dots.dots.push_back({{-.019 + .002 * x, -.019 + .002 * y, 0}, {0, 0, 1}, {0, 0, 1}});
+      for (int x = 0; x < 20; ++x)
+        dots.dots.push_back({{-.019 + .002 * x, -.019 + .002 * y, 0}, {0, 0, 1}, {0, 0, 1}});
     plan.program.pitch_m = dots.pitch_m;
     for (std::uint32_t i = 0; i < dots.dots.size(); ++i) {
       if (i < skipped_count) {
@@ -42,7 +44,8 @@ struct PlannedPlate {
 std::size_t count_of(const Picture& picture, const std::array<std::uint8_t, 3>& color) {
   std::size_t count = 0;
   for (std::size_t i = 0; i + 2 < picture.pixels.size(); i += 3)
-    if (std::equal(color.begin(), color.end(), picture.pixels.begin() + static_cast<std::ptrdiff_t>(i))) ++count;
+    if (std::equal(color.begin(), color.end(), picture.pixels.begin() + static_cast<std::ptrdiff_t>(i)))
+      ++count;
   return count;
 }
 
@@ -51,7 +54,8 @@ TEST(PlanningPictures, SkippedDotsHaveTheColorOfTheirReason) {
   for (const SkipReason reason : {SkipReason::kOccluded, SkipReason::kJointLimit, SkipReason::kNoPath}) {
     const PlannedPlate some(kSkipped, reason), none(0, reason);
     const Picture marked = planning_sheet(some.mesh, some.dots, some.plan);
-    // A quarter of a plate that is 400 pixels wide, marks touching; seen from the top only, and as a line on its edge.
+    // A quarter of a plate that is 400 pixels wide, marks touching; seen from the top only, and as a line on
+    // its edge.
     EXPECT_GT(count_of(marked, skip_reason_color(reason)), 30'000U) << skip_reason_name(reason);
     EXPECT_EQ(count_of(planning_sheet(none.mesh, none.dots, none.plan), skip_reason_color(reason)), 0U);
   }
@@ -71,11 +75,12 @@ TEST(PlanningPictures, TimeIsPlottedToItsEnd) {
   const CellDescription cell = load_cell(find_cell("default"));
   std::size_t calls = 0;
   TimeSplit last;
-  const TimeSplit total = estimate_time(cell, plate.plan.program, [&](std::size_t exposure, const TimeSplit& so_far) {
-    EXPECT_EQ(exposure, calls++);
-    EXPECT_GE(so_far.total_s(), last.total_s());
-    last = so_far;
-  });
+  const TimeSplit total =
+      estimate_time(cell, plate.plan.program, [&](std::size_t exposure, const TimeSplit& so_far) {
+        EXPECT_EQ(exposure, calls++);
+        EXPECT_GE(so_far.total_s(), last.total_s());
+        last = so_far;
+      });
   EXPECT_EQ(calls, plate.plan.program.exposures.size());
   EXPECT_DOUBLE_EQ(last.total_s(), total.total_s()) << "the program has no path home";
 }

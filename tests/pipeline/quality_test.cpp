@@ -119,11 +119,13 @@ TEST_F(Quality, DotsOfAFileAreHeldAgainstTheirModel) {
   write_dots(sequence, reasons, names, file);
 
   const auto request = [&](const std::string& more) {
-    return R"({"set":")" + file + R"(","model":")" + model + R"(","settings":"{\"size_mm\":40}")" + more + "}";
+    return R"({"set":")" + file + R"(","model":")" + model + R"(","settings":"{\"size_mm\":40}")" + more +
+           "}";
   };
   const Json json = run(request(""));
   EXPECT_EQ(figure(json, "/sizes/0/count"), 600);
-  EXPECT_NEAR(figure(json, "/sizes/0/largest_hole"), std::sqrt(.5), .13);  // to an eighth of a pitch under a tone
+  EXPECT_NEAR(figure(json, "/sizes/0/largest_hole"), std::sqrt(.5),
+              .13);  // to an eighth of a pitch under a tone
   // 36 of a face's dots lie nearest to those around the edge, half a spacing from it on either side.
   EXPECT_NEAR(figure(json, "/sizes/0/spacing/mean"), .9306 * (.64 + .36 * std::sqrt(.5)), 1e-3);
   expect_files(json);
@@ -144,7 +146,8 @@ TEST_F(Quality, ATexturedModelIsMeasuredByItsTone) {
   EXPECT_LT(figure(json, "/sizes/0/discrepancy/balls/rms"), 1.5e-3) << "5e-4; of random dots 5e-3";
   expect_files(json);
 
-  run_dry_run({model, job_settings_from_json(R"({"size_mm":20,"dpi":50})"), find_cell("default"), output_}, {});
+  run_dry_run({model, job_settings_from_json(R"({"size_mm":20,"dpi":50})"), find_cell("default"), output_},
+              {});
   const std::string request = R"({"set":")" + (output_ / "dots.ply").string() + R"(","model":")" + model +
                               R"(","settings":"{\"size_mm\":20,\"dpi\":50}"})";
   EXPECT_LT(figure(run(request), "/sizes/0/discrepancy/balls/rms"), 2e-2);
@@ -152,12 +155,17 @@ TEST_F(Quality, ATexturedModelIsMeasuredByItsTone) {
 
 TEST_F(Quality, RequestsThatMakeNoSenseAreRefused) {
   EXPECT_EQ(refusal(R"({"set":"spere"})").rfind("$.set: there is no file \"spere\"", 0), 0u);
-  EXPECT_EQ(refusal(R"({"set":"plane","sampler":"bleu"})").rfind("$.sampler: expected \"centroid\", ", 0), 0u);
-  EXPECT_EQ(refusal(R"({"set":"plane","curve":"z"})").rfind("$.curve: expected \"hilbert\" or \"peano2\"", 0), 0u);
+  EXPECT_EQ(refusal(R"({"set":"plane","sampler":"bleu"})").rfind("$.sampler: expected \"centroid\", ", 0),
+            0u);
+  EXPECT_EQ(refusal(R"({"set":"plane","curve":"z"})").rfind("$.curve: expected \"hilbert\" or \"peano2\"", 0),
+            0u);
   EXPECT_EQ(refusal(R"({"set":"plane","area":"circle"})").rfind("$.area: expected \"triangle\", ", 0), 0u);
   EXPECT_EQ(refusal(R"({"set":"plane","density":"v"})").rfind("$.density: expected ", 0), 0u);
-  EXPECT_EQ(refusal(R"({"set":"plane","points":"sobol","sampler":"even"})").rfind("$.sampler: has no effect", 0), 0u);
-  EXPECT_EQ(refusal(R"({"set":"monkey_saddle","points":"sobol"})").rfind("$.points: is for the plane", 0), 0u);
+  EXPECT_EQ(
+      refusal(R"({"set":"plane","points":"sobol","sampler":"even"})").rfind("$.sampler: has no effect", 0),
+      0u);
+  EXPECT_EQ(refusal(R"({"set":"monkey_saddle","points":"sobol"})").rfind("$.points: is for the plane", 0),
+            0u);
   EXPECT_EQ(refusal(R"({"set":"plane","count":[0]})").rfind("$.count[0]", 0), 0u);
   EXPECT_EQ(refusal(R"({"set":"plane","counts":[5]})").rfind("$.counts", 0), 0u);
   EXPECT_FALSE(fs::exists(output_));

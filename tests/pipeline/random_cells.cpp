@@ -15,10 +15,14 @@ namespace {
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : random_(seed) {}
-  double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+  double between(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
   int upto(int most) { return std::uniform_int_distribution<int>(0, most)(random_); }
   bool once_in(int times) { return upto(times - 1) == 0; }
-  Eigen::Vector3d in_box(double half) { return {between(-half, half), between(-half, half), between(-half, half)}; }
+  Eigen::Vector3d in_box(double half) {
+    return {between(-half, half), between(-half, half), between(-half, half)};
+  }
 
  private:
   std::mt19937_64 random_;
@@ -40,7 +44,8 @@ void shake_arm(CellDescription& cell, Dice& dice) {
   arm.upper_link = {.height_m = top_m + dice.between(-.05, .05), .radius_m = dice.between(.01, .06)};
   arm.quill_length_m = std::max(.01, top_m - cell.axes[kJ3].min);
   arm.column = {};
-  if (dice.once_in(2)) arm.column = {.height_m = dice.between(.05, top_m), .radius_m = dice.between(.02, .15)};
+  if (dice.once_in(2))
+    arm.column = {.height_m = dice.between(.05, top_m), .radius_m = dice.between(.02, .15)};
 }
 
 void shake_axes(CellDescription& cell, Dice& dice) {
@@ -63,7 +68,8 @@ void shake_axes(CellDescription& cell, Dice& dice) {
     const double margin = (cell.limit_margin + .01) * (axis.max - axis.min);
     axis.home = std::clamp(axis.home, axis.min + margin, axis.max - margin);
   }
-  cell.axes[kJ3].home = cell.axes[kJ3].max - (cell.limit_margin + .01) * (cell.axes[kJ3].max - cell.axes[kJ3].min);
+  cell.axes[kJ3].home =
+      cell.axes[kJ3].max - (cell.limit_margin + .01) * (cell.axes[kJ3].max - cell.axes[kJ3].min);
 }
 
 void shake_table(CellDescription& cell, Dice& dice) {
@@ -127,7 +133,8 @@ void add_box(TexturedMesh& mesh, Dice& dice) {
           .toRotationMatrix();
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (int i = 0; i < 8; ++i)
-    mesh.vertices.push_back(middle + turn * Eigen::Vector3d(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(),
+    mesh.vertices.push_back(middle + turn * Eigen::Vector3d(i & 1 ? half.x() : -half.x(),
+                                                            i & 2 ? half.y() : -half.y(),
                                                             i & 4 ? half.z() : -half.z()));
   constexpr std::uint32_t kQuads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
                                           {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
@@ -178,11 +185,13 @@ TexturedMesh random_shape(Dice& dice, std::string& shape) {
 /// Black, turned anyhow, as large as asked, standing on z = 0.
 TexturedMesh stand(TexturedMesh mesh, double size_m, Dice& dice) {
   const Eigen::Vector3d axis = (dice.in_box(1) + Eigen::Vector3d(0, 0, 1.1)).normalized();
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(dice.once_in(2) ? 0 : dice.between(0, 3), axis).toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(dice.once_in(2) ? 0 : dice.between(0, 3), axis).toRotationMatrix();
   Eigen::AlignedBox3d box;
   for (auto& p : mesh.vertices) box.extend(p = turn * p);
   const double scale = size_m / std::max(1e-9, box.sizes().maxCoeff());
-  for (auto& p : mesh.vertices) p = scale * (p - Eigen::Vector3d(box.center().x(), box.center().y(), box.min().z()));
+  for (auto& p : mesh.vertices)
+    p = scale * (p - Eigen::Vector3d(box.center().x(), box.center().y(), box.min().z()));
   mesh.corner_uv.clear();
   mesh.corner_luminance.clear();
   mesh.material_index.clear();

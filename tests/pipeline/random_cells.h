@@ -17,8 +17,8 @@ struct RandomWork {
   std::string shape;  ///< what kind of mesh
 };
 
-/// Geometry, limits and dynamics of the cell anywhere between plausible and silly; home inside the limits. Same seed,
-/// same work.
+/// Geometry, limits and dynamics of the cell anywhere between plausible and silly; home inside the limits.
+/// Same seed, same work.
 RandomWork random_work(std::uint64_t seed);
 
 }  // namespace hilbrush::testing_pipeline

@@ -18,8 +18,9 @@
 #include "sim/film/film.h"
 #include "tests/pipeline/tick_witness.h"
 
-/// Random cells and objects, through the whole pipeline: each program passes its check, the executed motion keeps all
-/// limits and all clearances on every control tick, and every exposure lands on its dot; or the planner says why not.
+/// Random cells and objects, through the whole pipeline: each program passes its check, the executed motion
+/// keeps all limits and all clearances on every control tick, and every exposure lands on its dot; or the
+/// planner says why not.
 namespace hilbrush::testing_pipeline {
 namespace {
 
@@ -130,12 +131,15 @@ TEST(RandomCells, EveryProgramPassesItsCheckAndEveryExposureLands) {
     if (testing::Test::HasFatalFailure()) break;
   }
   std::printf(
-      "%zu cells and objects (%zu without a surface, %zu without a program), %zu of %zu dots exposed, worst hit %.3f "
-      "um, %zu control ticks looked at, estimated time off by at most %.2f %%, slowest %.2f CPU s (seed %llu)\n",
+      "%zu cells and objects (%zu without a surface, %zu without a program), %zu of %zu dots exposed, worst "
+      "hit %.3f "
+      "um, %zu control ticks looked at, estimated time off by at most %.2f %%, slowest %.2f CPU s (seed "
+      "%llu)\n",
       campaign.works, campaign.without_surface, campaign.without_program, campaign.exposed, campaign.dots,
       campaign.worst_hit_um, campaign.ticks, 100 * campaign.worst_eta, campaign.slowest_s,
       static_cast<unsigned long long>(campaign.slowest_seed));
-  for (const auto& [reason, times] : campaign.skipped) std::printf("  %zu dots skipped: %s\n", times, reason.c_str());
+  for (const auto& [reason, times] : campaign.skipped)
+    std::printf("  %zu dots skipped: %s\n", times, reason.c_str());
   if (count >= 60) {
     EXPECT_GT(campaign.exposed, campaign.dots / 4);
     EXPECT_LT(campaign.slowest_s, 60);

@@ -10,8 +10,8 @@
 #include "tests/support/shell.h"
 #include "tests/support/temporary_folder.h"
 
-/// Models that other people made, through the command. They are not part of the project: HILBRUSH_TEST_MODELS says
-/// where they are.
+/// Models that other people made, through the command. They are not part of the project: HILBRUSH_TEST_MODELS
+/// says where they are.
 namespace hilbrush::testing_pipeline {
 namespace {
 
@@ -55,14 +55,16 @@ TEST_P(RealModel, IsPaintedAndItsCountsAddUp) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, RealModel,
-                         testing::Values("cow_mesh/cow.obj", "head.wrl", "chest.wrl", "rfoot.wrl", "house/house.wrl",
-                                         "MAIN_BELT.wrl", "tank.wrl", "comet-tempel.wrl", "meshWithTexture.wrl",
-                                         "pixelTexture.wrl", "elevationGrid2.wrl", "extrusion3.wrl", "fuze.obj",
-                                         "capsule.obj", "featuretype.STL", "nefertiti-lowres.obj", "plane_holes.obj"),
+                         testing::Values("cow_mesh/cow.obj", "head.wrl", "chest.wrl", "rfoot.wrl",
+                                         "house/house.wrl", "MAIN_BELT.wrl", "tank.wrl", "comet-tempel.wrl",
+                                         "meshWithTexture.wrl", "pixelTexture.wrl", "elevationGrid2.wrl",
+                                         "extrusion3.wrl", "fuze.obj", "capsule.obj", "featuretype.STL",
+                                         "nefertiti-lowres.obj", "plane_holes.obj"),
                          [](const auto& each) {
                            std::string name = each.param;
                            std::replace_if(
-                               name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+                               name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; },
+                               '_');
                            return name;
                          });
 

@@ -56,8 +56,8 @@ void expect_counts_add_up(const Json& dots) {
   for (const auto& [reason, count] : dots.at("skipped").items()) skipped += count.get<std::uint64_t>();
   const std::uint64_t placed = dots.at("placed");
   const std::uint64_t exposed = dots.at("exposed");
-  EXPECT_EQ(placed,
-            exposed + dots.at("in_doubt").get<std::uint64_t>() + dots.at("remaining").get<std::uint64_t>() + skipped);
+  EXPECT_EQ(placed, exposed + dots.at("in_doubt").get<std::uint64_t>() +
+                        dots.at("remaining").get<std::uint64_t>() + skipped);
   EXPECT_EQ(dots.at("in_doubt"), 0) << "a dry run is never interrupted";
   EXPECT_EQ(dots.at("remaining"), 0) << "a dry run paints all it planned";
 }
@@ -71,12 +71,14 @@ void expect_sound_dry_run(const std::string& report_text, const std::filesystem:
     ASSERT_TRUE(report.contains(at)) << pointer << " is missing";
     EXPECT_TRUE(report.at(at).is_number()) << pointer << " is " << report.at(at);
   }
-  for (const char* pointer : {"/mesh/file", "/mesh/genus", "/mesh/repairs", "/mesh/warnings", "/fidelity/f1_db",
-                              "/fidelity/f2_db", "/version", "/mesh/size_mm", "/mesh/min_mm", "/mesh/max_mm"})
+  for (const char* pointer :
+       {"/mesh/file", "/mesh/genus", "/mesh/repairs", "/mesh/warnings", "/fidelity/f1_db", "/fidelity/f2_db",
+        "/version", "/mesh/size_mm", "/mesh/min_mm", "/mesh/max_mm"})
     EXPECT_TRUE(report.contains(Json::json_pointer(pointer))) << pointer << " is missing";
 
   expect_counts_add_up(report.at("dots"));
-  const bool is_blank = report.at("mesh").at("warnings").dump().find("there is nothing to paint") != std::string::npos;
+  const bool is_blank =
+      report.at("mesh").at("warnings").dump().find("there is nothing to paint") != std::string::npos;
   EXPECT_EQ(report.at("dots").at("placed") == 0, is_blank);
   EXPECT_GT(report.at("mesh").at("area_mm2"), 0);
   EXPECT_LE(report.at("incidence_deg").at("max"), 45.001);

@@ -8,10 +8,12 @@ namespace hilbrush {
 namespace {
 
 SkippedDot tilt(double excess_deg) {
-  return {0, SkipReason::kIncidence, "x", "tilt past its limit", excess_deg * kDegree, SkipMeasure::kExcessAngle};
+  return {
+      0, SkipReason::kIncidence, "x", "tilt past its limit", excess_deg * kDegree, SkipMeasure::kExcessAngle};
 }
 SkippedDot beam(double free_mm) {
-  return {0, SkipReason::kOccluded, "x", "beam blocked by the object", free_mm * 1e-3, SkipMeasure::kFreeLength};
+  return {
+      0, SkipReason::kOccluded, "x", "beam blocked by the object", free_mm * 1e-3, SkipMeasure::kFreeLength};
 }
 
 TEST(SkippedFigures, AreCountedByWhatTheyAre) {

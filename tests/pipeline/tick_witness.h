@@ -8,8 +8,8 @@
 #include "planner/cell_model/cell_description.h"
 #include "sim/devices/sim_cell.h"
 
-/// Looks at the simulated cell's true joints on every control tick while the executor sleeps: positions, speeds and
-/// accelerations against the cell's limits, and whatever the test asks besides.
+/// Looks at the simulated cell's true joints on every control tick while the executor sleeps: positions,
+/// speeds and accelerations against the cell's limits, and whatever the test asks besides.
 namespace hilbrush::testing_pipeline {
 
 class TickWitness final : public Clock {

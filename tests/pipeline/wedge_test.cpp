@@ -70,12 +70,14 @@ TEST_F(WedgeForm, ReflectancesAreReadByThePaint) {
 }
 
 TEST_F(WedgeForm, MistakesAreRefusedWithTheirPath) {
-  EXPECT_NE(error_of(form_).find("$.steps[0].painted: has no reading yet"), std::string::npos) << error_of(form_);
+  EXPECT_NE(error_of(form_).find("$.steps[0].painted: has no reading yet"), std::string::npos)
+      << error_of(form_);
   fill_in();
   EXPECT_EQ(error_of(form_), "accepted");
   Json other = form_;
   other["sampler"] = "even";
-  EXPECT_NE(error_of(other).find("$.sampler: the wedge was painted with even"), std::string::npos) << error_of(other);
+  EXPECT_NE(error_of(other).find("$.sampler: the wedge was painted with even"), std::string::npos)
+      << error_of(other);
   other = form_;
   other["dpi"] = 200;
   EXPECT_NE(error_of(other).find("$.dpi: the settings have another"), std::string::npos) << error_of(other);
@@ -99,7 +101,8 @@ TEST_F(WedgeForm, OneWrongReadingIsRefusedAndNamed) {
   EXPECT_NE(error_of(wrong).find("$.steps: row 2, column 3 reads"), std::string::npos) << error_of(wrong);
   wrong = form_;
   wrong["steps"][6]["painted"] = .99;
-  EXPECT_NE(error_of(wrong).find("but row 2, column 3, which was asked for less, reads 0.99"), std::string::npos)
+  EXPECT_NE(error_of(wrong).find("but row 2, column 3, which was asked for less, reads 0.99"),
+            std::string::npos)
       << error_of(wrong);
   wrong = form_;
   for (const int i : {14, 15}) wrong["steps"][i]["painted"] = .99 - .001 * i;
@@ -110,7 +113,8 @@ TEST_F(WedgeForm, EqualReadingsAndMissingFieldsAreRefused) {
   fill_in();
   Json wrong = form_;
   for (Json& step : wrong["steps"]) step["painted"] = .5;
-  EXPECT_NE(error_of(wrong).find("$.steps: all fields read nearly the same"), std::string::npos) << error_of(wrong);
+  EXPECT_NE(error_of(wrong).find("$.steps: all fields read nearly the same"), std::string::npos)
+      << error_of(wrong);
   wrong = form_;
   wrong["steps"].erase(4);
   EXPECT_NE(error_of(wrong).find("$.steps: the field in row 2, column 1 is missing"), std::string::npos)
@@ -123,10 +127,11 @@ TEST_F(WedgeForm, EqualReadingsAndMissingFieldsAreRefused) {
 TEST_F(WedgeForm, TheModelAsksForItsSteps) {
   const auto file = write("wedge.wrl", wedge_model(card_, cell_.paint));
   const Model model = load_model(file, load_image_file);
-  const ToneField tone(model.mesh,
-                       ToneOptions{.untextured = Untextured::kMaterial, .curve = {{0, 1}, {0, cell_.paint.asked_max}}});
+  const ToneField tone(model.mesh, ToneOptions{.untextured = Untextured::kMaterial,
+                                               .curve = {{0, 1}, {0, cell_.paint.asked_max}}});
   std::vector<double> asked;
-  for (std::uint32_t t = 0; t < model.mesh.triangle_count(); ++t) asked.push_back(tone.asked({.triangle = t}));
+  for (std::uint32_t t = 0; t < model.mesh.triangle_count(); ++t)
+    asked.push_back(tone.asked({.triangle = t}));
   for (const double step : card_.asked)
     EXPECT_GE(std::ranges::count_if(asked, [&](double a) { return std::abs(a - step) < 1e-4; }), 2) << step;
   EXPECT_GT(model.mesh.area_vector(0).y(), 0);  // facing up

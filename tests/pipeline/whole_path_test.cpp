@@ -49,8 +49,8 @@ TEST_P(SmallModel, IsPaintedAndItsCountsAddUp) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, SmallModel,
-                         testing::Values("letter_cube.wrl", "letter_cube.obj", "letter_cube.ply", "face_colors.wrl",
-                                         "vertex_colors.wrl", "vertex_colors.ply"));
+                         testing::Values("letter_cube.wrl", "letter_cube.obj", "letter_cube.ply",
+                                         "face_colors.wrl", "vertex_colors.wrl", "vertex_colors.ply"));
 
 TEST(EggCup, IsPaintedWhole) {
   const TemporaryFolder folder;
@@ -65,19 +65,22 @@ TEST(EggCup, IsPaintedWhole) {
   const Json& mesh = report.at("mesh");
   EXPECT_NEAR(mesh.at("size_mm").at(2).get<double>(), 60, 1e-3) << "its longest side";
   EXPECT_NEAR(mesh.at("min_mm").at(2).get<double>(), 0, 1e-3) << "it stands on the post";
-  EXPECT_NEAR(mesh.at("min_mm").at(0).get<double>(), -mesh.at("max_mm").at(0).get<double>(), 1e-3) << "centered";
-  EXPECT_GE(report.at("dots").at("exposed").get<double>(), .99 * report.at("dots").at("placed").get<double>());
+  EXPECT_NEAR(mesh.at("min_mm").at(0).get<double>(), -mesh.at("max_mm").at(0).get<double>(), 1e-3)
+      << "centered";
+  EXPECT_GE(report.at("dots").at("exposed").get<double>(),
+            .99 * report.at("dots").at("placed").get<double>());
 }
 
 TEST(EggCup, NeedlesPaintTheSamePicture) {
-  // The dots follow the surface and its picture, not the triangulation: the count is the same within what the coarser
-  // outline takes away.
+  // The dots follow the surface and its picture, not the triangulation: the count is the same within what the
+  // coarser outline takes away.
   const TemporaryFolder even_folder, needle_folder;
   const Json even = dry_run("eggcup.wrl", settings_of(60, 50), even_folder.path());
   const Json needles = dry_run("eggcup_needles.wrl", settings_of(60, 50), needle_folder.path());
   const double placed = even.at("dots").at("placed");
   EXPECT_NEAR(needles.at("dots").at("placed").get<double>(), placed, .02 * placed);
-  EXPECT_NEAR(needles.at("fidelity").at("f2_db").get<double>(), even.at("fidelity").at("f2_db").get<double>(), 3);
+  EXPECT_NEAR(needles.at("fidelity").at("f2_db").get<double>(), even.at("fidelity").at("f2_db").get<double>(),
+              3);
 }
 
 TEST(WholePath, TheSameBytesAgain) {
@@ -100,8 +103,8 @@ TEST(WholePath, SamplersAndExactCountsReachTheProgram) {
     settings.dots = 1234;
     settings.sampler = sampler;
     const TemporaryFolder folder;
-    const Json report =
-        Json::parse(run_plan({test_data("letter_cube.obj"), settings, find_cell("default"), folder.path()}, {}));
+    const Json report = Json::parse(
+        run_plan({test_data("letter_cube.obj"), settings, find_cell("default"), folder.path()}, {}));
     EXPECT_EQ(report.at("dots").at("requested"), 1234) << sampler_name(sampler);
     EXPECT_EQ(report.at("dots").at("placed"), 1234) << sampler_name(sampler);
   }
@@ -121,7 +124,8 @@ TEST(WholePath, ProgressNeverGoesBackAndNamesEveryStage) {
     EXPECT_LE(fraction, 1 + 1e-9) << stage;
     last = fraction;
   };
-  run_dry_run({test_data("letter_cube.wrl"), settings_of(20, 50), find_cell("default"), folder.path()}, listener);
+  run_dry_run({test_data("letter_cube.wrl"), settings_of(20, 50), find_cell("default"), folder.path()},
+              listener);
   for (const char* stage : {"load", "disk", "curve", "dots", "plan", "check", "paint", "images"})
     EXPECT_EQ(std::count(stages.begin(), stages.end(), stage), 1) << stage;
 }
@@ -142,13 +146,15 @@ TEST(WholePath, RefusalsNameWhatToChange) {
   const std::string size = refusal({test_data("letter_cube.obj"), no_size, cell, folder.path()});
   EXPECT_NE(size.find("size"), std::string::npos) << size;
   EXPECT_NE(size.find("units"), std::string::npos) << size;
-  EXPECT_EQ(refusal({test_data("letter_cube.wrl"), no_size, cell, folder.path()}), "") << "VRML files are in meters";
-  EXPECT_NE(
-      refusal({test_data("no_such_model.wrl"), settings_of(20, 80), cell, folder.path()}).find("no_such_model.wrl"),
-      std::string::npos);
+  EXPECT_EQ(refusal({test_data("letter_cube.wrl"), no_size, cell, folder.path()}), "")
+      << "VRML files are in meters";
+  EXPECT_NE(refusal({test_data("no_such_model.wrl"), settings_of(20, 80), cell, folder.path()})
+                .find("no_such_model.wrl"),
+            std::string::npos);
 
   std::ofstream(folder.path() / "a_file") << "not a folder";
-  EXPECT_NE(refusal({test_data("letter_cube.wrl"), settings_of(20, 80), cell, folder.path() / "a_file/out"}), "");
+  EXPECT_NE(refusal({test_data("letter_cube.wrl"), settings_of(20, 80), cell, folder.path() / "a_file/out"}),
+            "");
 }
 
 }  // namespace

@@ -19,7 +19,8 @@ TEST(Mounting, NothingSetChangesNothing) {
 
 TEST(Mounting, TheFixtureIsTheJobs) {
   const CellDescription cell = with_fixture(
-      default_cell(), {.post_height_m = .08, .post_radius_m = .004, .plate_radius_m = .05, .offset_m = {}, .turn = 0});
+      default_cell(),
+      {.post_height_m = .08, .post_radius_m = .004, .plate_radius_m = .05, .offset_m = {}, .turn = 0});
   EXPECT_EQ(cell.fixture.post_height_m, .08);
   EXPECT_EQ(cell.fixture.post_radius_m, .004);
   EXPECT_EQ(cell.table.plate_radius_m, .05);

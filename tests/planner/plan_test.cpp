@@ -93,7 +93,8 @@ TEST(Plan, ACupIsPaintedInsideOutsideAndBelow) {
   std::size_t inside = 0;
   for (const Exposure& exposure : plan.program.exposures) {
     if (exposure.position_O.z() < 1e-6) ++below;
-    if (exposure.position_O.z() > .03 && exposure.position_O.dot(exposure.normal_O.cast<double>()) < 0) ++inside;
+    if (exposure.position_O.z() > .03 && exposure.position_O.dot(exposure.normal_O.cast<double>()) < 0)
+      ++inside;
   }
   EXPECT_GT(below, 500U);
   EXPECT_GT(inside, 100U);
@@ -108,9 +109,9 @@ TEST(Plan, SameBytesForAnyNumberOfThreads) {
   ASSERT_EQ(again.program.exposures.size(), plan.program.exposures.size());
   ASSERT_EQ(again.program.vias.size(), plan.program.vias.size());
   for (std::size_t i = 0; i < again.program.exposures.size(); ++i)
-    ASSERT_EQ(
-        std::memcmp(again.program.exposures[i].joints.data(), plan.program.exposures[i].joints.data(), sizeof(Joints)),
-        0)
+    ASSERT_EQ(std::memcmp(again.program.exposures[i].joints.data(), plan.program.exposures[i].joints.data(),
+                          sizeof(Joints)),
+              0)
         << "exposure " << i;
   for (std::size_t i = 0; i < again.program.vias.size(); ++i)
     ASSERT_EQ(again.program.vias[i].joints, plan.program.vias[i].joints) << "way-point " << i;
@@ -132,7 +133,8 @@ TEST(Plan, NoDotsNoExposures) {
   const Plan plan = plan_exposures(planned.reach, none);
   EXPECT_TRUE(plan.program.exposures.empty());
   EXPECT_TRUE(plan.skipped.empty());
-  EXPECT_TRUE(check_program(plan.program, plan.skipped, none, planned.mesh, planned.cell, planned.options).empty());
+  EXPECT_TRUE(
+      check_program(plan.program, plan.skipped, none, planned.mesh, planned.cell, planned.options).empty());
 }
 
 TEST(Plan, ProgressReachesOneAndMayEndThePlan) {
@@ -143,8 +145,9 @@ TEST(Plan, ProgressReachesOneAndMayEndThePlan) {
     last = fraction;
   });
   EXPECT_EQ(last, 1);
-  EXPECT_THROW(plan_exposures(planned.reach, planned.dots, [](double) { throw std::runtime_error("enough"); }),
-               std::runtime_error);
+  EXPECT_THROW(
+      plan_exposures(planned.reach, planned.dots, [](double) { throw std::runtime_error("enough"); }),
+      std::runtime_error);
 }
 
 TEST(Plan, TooMuchEnergyIsSkippedWithAReason) {
@@ -242,7 +245,8 @@ TEST(Approach, FromHomeAndFromNonsense) {
   EXPECT_THROW(plan_approach(reach, plan.program, 0, outside), InputError);
   outside[kJ1] = std::nan("");
   EXPECT_THROW(plan_approach(reach, plan.program, 0, outside), InputError);
-  EXPECT_THROW(plan_approach(reach, plan.program, plan.program.exposures.size(), home_joints(cell)), InputError);
+  EXPECT_THROW(plan_approach(reach, plan.program, plan.program.exposures.size(), home_joints(cell)),
+               InputError);
   // A pose in which the lens is inside the ball: a path out of it is not guaranteed.
   const Kinematics kinematics(cell);
   Joints inside = home_joints(cell);

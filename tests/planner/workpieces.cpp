@@ -77,7 +77,8 @@ DotSequence scatter(const TexturedMesh& mesh, double pitch_m, unsigned seed) {
   for (std::size_t i = 0; i < count; ++i) {
     const double at = sum * (static_cast<double>(i) + uniform(random)) / static_cast<double>(count);
     const auto t = static_cast<std::size_t>(
-        std::min(std::lower_bound(area_sum.begin(), area_sum.end(), at), area_sum.end() - 1) - area_sum.begin());
+        std::min(std::lower_bound(area_sum.begin(), area_sum.end(), at), area_sum.end() - 1) -
+        area_sum.begin());
     double v = uniform(random);
     double w = uniform(random);
     if (v + w > 1) {

@@ -42,7 +42,9 @@ TEST(PlacePicture, MeasuresThePathOfTheMovedDots) {
   options.sample.sampler = Sampler::kFine;
   options.sample.dot_count = 1000;
   options.fine_passes = 2;
-  options.spot = [](double pitch_m) { return SpotModel{pitch_m, [](double dose) { return std::min(dose, 1.); }}; };
+  options.spot = [](double pitch_m) {
+    return SpotModel{pitch_m, [](double dose) { return std::min(dose, 1.); }};
+  };
   expect_path_of_returned_dots(options);
 }
 

@@ -12,7 +12,8 @@ namespace {
 /// Rest to rest over a distance: the textbook trapezoid, or triangle where the speed is never reached.
 double trapezoid_duration(double distance, double speed_max, double acceleration) {
   const double ramp = speed_max * speed_max / acceleration;
-  return distance < ramp ? 2 * std::sqrt(distance / acceleration) : distance / speed_max + speed_max / acceleration;
+  return distance < ramp ? 2 * std::sqrt(distance / acceleration)
+                         : distance / speed_max + speed_max / acceleration;
 }
 
 TEST(AxisMotion, LastsAsLongAsTheClosedForm) {
@@ -34,7 +35,8 @@ TEST(AxisMotion, NoDistanceTakesNoTime) {
   EXPECT_EQ(motion.speed(7), 0);
 }
 
-/// Position and speed are continuous, speed and acceleration stay within limits, over any mixture of moves and stops.
+/// Position and speed are continuous, speed and acceleration stay within limits, over any mixture of moves
+/// and stops.
 TEST(AxisMotion, StaysContinuousAndWithinLimitsThroughMovesAndStops) {
   for (unsigned seed = 1; seed <= 50; ++seed) {
     std::mt19937 random(seed);
@@ -55,7 +57,8 @@ TEST(AxisMotion, StaysContinuousAndWithinLimitsThroughMovesAndStops) {
         ASSERT_LE(std::abs(motion.speed(t)), speed_max * (1 + 1e-9)) << "seed " << seed;
         ASSERT_LE(std::abs(motion.speed(t + step) - motion.speed(t)), acceleration * step * (1 + 1e-6) + 1e-9)
             << "seed " << seed;
-        ASSERT_LE(std::abs(motion.position(t + step) - motion.position(t)), speed_max * step * (1 + 1e-6) + 1e-9)
+        ASSERT_LE(std::abs(motion.position(t + step) - motion.position(t)),
+                  speed_max * step * (1 + 1e-6) + 1e-9)
             << "seed " << seed;
       }
       now = until;
@@ -88,7 +91,8 @@ TEST(AxisMotion, CoordinatedAxesRunStraightWithinTheirLimits) {
             (motions[0].position(t) - motions[0].position(go_s)) / (target[0] - motions[0].position(go_s));
         for (std::size_t i = 0; i < 3; ++i) {
           EXPECT_LE(std::abs(motions[i].speed(t)), limits[i].speed_max * (1 + 1e-9)) << "seed " << seed;
-          EXPECT_LE(std::abs(motions[i].speed(t + dt) - motions[i].speed(t)), limits[i].acceleration * dt * (1 + 1e-6))
+          EXPECT_LE(std::abs(motions[i].speed(t + dt) - motions[i].speed(t)),
+                    limits[i].acceleration * dt * (1 + 1e-6))
               << "seed " << seed;
           if (t > go_s)
             EXPECT_NEAR(motions[i].position(t),

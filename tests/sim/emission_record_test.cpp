@@ -16,7 +16,8 @@ class EmissionRecord : public ::testing::Test {
   static Emission emission(int i) {
     Emission e;
     for (std::size_t k = 0; k < kAxisCount; ++k) e.joints[k] = i + .1 * static_cast<double>(k);
-    e.start_s = 10. * i, e.length_s = .004, e.commanded_s = .005, e.power_w = 1.5 + i, e.is_moving = i % 2 == 1;
+    e.start_s = 10. * i, e.length_s = .004, e.commanded_s = .005, e.power_w = 1.5 + i,
+    e.is_moving = i % 2 == 1;
     return e;
   }
   void append(int first, int end) const {
@@ -29,7 +30,9 @@ class EmissionRecord : public ::testing::Test {
     all << in.rdbuf();
     return all.str();
   }
-  void write(const std::string& bytes) const { std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes; }
+  void write(const std::string& bytes) const {
+    std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
+  }
   void expect_whole(std::size_t count) const {
     const std::vector<Emission> read = read_emission_record(file_);
     ASSERT_EQ(read.size(), count);

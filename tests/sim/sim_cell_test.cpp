@@ -67,7 +67,8 @@ TEST(SimCell, RefusesWhatItsStateDoesNotAllowInASentence) {
   EXPECT_EQ(refusal([&] { cell.robot.move_to({}, 0); }), "the robot cannot be moved: it is disconnected");
   EXPECT_EQ(refusal([&] { cell.robot.enable(); }), "the robot cannot be enabled: it is disconnected");
   EXPECT_EQ(refusal([&] { cell.robot.home(); }), "the robot cannot be homed: it is disconnected");
-  EXPECT_EQ(refusal([&] { cell.robot.clear_fault(); }), "the robot cannot be cleared of a fault: it is disconnected");
+  EXPECT_EQ(refusal([&] { cell.robot.clear_fault(); }),
+            "the robot cannot be cleared of a fault: it is disconnected");
   EXPECT_EQ(refusal([&] { cell.laser.enable(); }), "the laser cannot be enabled: it is disconnected");
   EXPECT_EQ(refusal([&] { cell.laser.fire(1, .005); }), "the laser cannot be fired: it is disconnected");
   cell.robot.connect();
@@ -91,7 +92,8 @@ TEST(SimCell, AMoveTakesTheSlowestAxisAndThenSettles) {
 
   const double speed = 4 * std::numbers::pi;
   const double acceleration = 8000 * std::numbers::pi / 180;
-  const double slowest = 2 * std::sqrt(1 / acceleration);  // J4 turns by 1 rad and never reaches its top speed
+  const double slowest =
+      2 * std::sqrt(1 / acceleration);  // J4 turns by 1 rad and never reaches its top speed
   ASSERT_LT(std::sqrt(acceleration), speed);
   const double move = std::ceil(slowest / .004) * .004;
   EXPECT_NEAR(robot.expected_arrival_s() - start, move + kSettle, 1e-9);
@@ -162,7 +164,8 @@ TEST(SimCell, APulseIsTimedByTheDeviceAndRecordedOnce) {
   ready.cell.laser.fire(2, .005);
   EXPECT_TRUE(ready.cell.laser.status().is_emitting);
   EXPECT_EQ(ready.cell.laser.status().state, DeviceState::kMoving);
-  EXPECT_EQ(refusal([&] { ready.cell.laser.fire(2, .005); }), "the laser cannot be fired: it is still emitting");
+  EXPECT_EQ(refusal([&] { ready.cell.laser.fire(2, .005); }),
+            "the laser cannot be fired: it is still emitting");
   ready.wait_for(.0051);
   EXPECT_FALSE(ready.cell.laser.status().is_emitting);
   EXPECT_TRUE(ready.cell.laser.off());
@@ -331,8 +334,8 @@ TEST(SimCell, AWakeEndsTheExecutorsSleep) {
   sleeper.join();
 }
 
-/// One executor paints while others ask for off, stop and status: nothing tears, and no pulse is recorded longer than
-/// commanded or twice.
+/// One executor paints while others ask for off, stop and status: nothing tears, and no pulse is recorded
+/// longer than commanded or twice.
 TEST(SimCell, OffAndStopMayComeFromAnyThread) {
   ReadyCell ready(.001, 0);
   std::atomic<bool> is_done{false};
@@ -342,7 +345,8 @@ TEST(SimCell, OffAndStopMayComeFromAnyThread) {
       while (!is_done) {
         if (k == 0) ready.cell.laser.off();
         if (k == 1) ready.cell.robot.stop(), ready.cell.table.stop();
-        if (k == 2) (void)ready.cell.robot.status(), (void)ready.cell.laser.status(), (void)ready.sim.joints();
+        if (k == 2)
+          (void)ready.cell.robot.status(), (void)ready.cell.laser.status(), (void)ready.sim.joints();
         std::this_thread::sleep_for(std::chrono::microseconds(50));
       }
     });

@@ -46,7 +46,8 @@ inline void add_quad(TexturedMesh& mesh, const std::array<Eigen::Vector3d, 4>& c
 inline TexturedMesh square(double size, double height = 0, float luminance = 0) {
   TexturedMesh mesh;
   const double r = size / 2;
-  add_quad(mesh, {Eigen::Vector3d{-r, -r, height}, {r, -r, height}, {r, r, height}, {-r, r, height}}, luminance);
+  add_quad(mesh, {Eigen::Vector3d{-r, -r, height}, {r, -r, height}, {r, r, height}, {-r, r, height}},
+           luminance);
   return mesh;
 }
 
@@ -57,15 +58,16 @@ inline TexturedMesh sphere(double radius, int rings) {
   const auto place = [&](int i, int j) {
     const double polar = std::numbers::pi * i / rings;
     const double azimuth = 2 * std::numbers::pi * j / around;
-    return Eigen::Vector3d(radius * std::sin(polar) * std::cos(azimuth), radius * std::sin(polar) * std::sin(azimuth),
-                           radius + radius * std::cos(polar));
+    return Eigen::Vector3d(radius * std::sin(polar) * std::cos(azimuth),
+                           radius * std::sin(polar) * std::sin(azimuth), radius + radius * std::cos(polar));
   };
   for (int i = 0; i < rings; ++i)
     for (int j = 0; j < around; ++j) {
       TexturedMesh quad;
       add_quad(quad, {place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)});
       for (int half = 0; half < 2; ++half) {
-        if ((i == 0 && half == 1) || (i == rings - 1 && half == 0)) continue;  // the poles' quads are triangles
+        if ((i == 0 && half == 1) || (i == rings - 1 && half == 0))
+          continue;  // the poles' quads are triangles
         const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
         for (int c = 0; c < 3; ++c) mesh.vertices.push_back(quad.corner(half, c));
         mesh.triangles.push_back({first, first + 1, first + 2});

@@ -10,8 +10,8 @@
 
 namespace hilbrush {
 
-/// Whether `kValue` is one of its enum's enumerators, by the text that the compiler gives it: "...::kBlue" or a cast
-/// such as "(Sampler)10".
+/// Whether `kValue` is one of its enum's enumerators, by the text that the compiler gives it: "...::kBlue" or
+/// a cast such as "(Sampler)10".
 template <auto kValue>
 constexpr bool is_enumerator() {
   const std::string_view function = __PRETTY_FUNCTION__;
@@ -19,8 +19,8 @@ constexpr bool is_enumerator() {
   return value.front() != '(';
 }
 
-/// Checks a table of names both ways: each enumerator has one entry, and each name is one value's. For enums that are
-/// numbered from 0 without gaps.
+/// Checks a table of names both ways: each enumerator has one entry, and each name is one value's. For enums
+/// that are numbered from 0 without gaps.
 template <const auto& kNames>
 void expect_names_both_ways() {
   constexpr std::size_t kCount = std::size(kNames);
@@ -35,7 +35,8 @@ void expect_names_both_ways() {
   EXPECT_EQ(*values.begin(), 0);
   EXPECT_EQ(*values.rbegin(), static_cast<int>(kCount) - 1);
   EXPECT_TRUE(is_enumerator<static_cast<Enum>(kCount - 1)>());
-  EXPECT_FALSE(is_enumerator<static_cast<Enum>(kCount)>()) << "an enumerator after the last named one has no name";
+  EXPECT_FALSE(is_enumerator<static_cast<Enum>(kCount)>())
+      << "an enumerator after the last named one has no name";
 }
 
 }  // namespace hilbrush

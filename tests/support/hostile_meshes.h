@@ -10,7 +10,8 @@ namespace hilbrush::test {
 /// Two squares that touch in a corner.
 inline TexturedMesh bow_tie() {
   TexturedMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {.02, 0, 0}, {.02, .02, 0}, {0, .02, 0}, {.04, .02, 0}, {.04, .04, 0}, {.02, .04, 0}};
+  mesh.vertices = {{0, 0, 0},     {.02, 0, 0},   {.02, .02, 0}, {0, .02, 0},
+                   {.04, .02, 0}, {.04, .04, 0}, {.02, .04, 0}};
   add_quad(mesh, 0, 1, 2, 3);
   add_quad(mesh, 2, 4, 5, 6);
   return finish(std::move(mesh));
@@ -26,7 +27,8 @@ inline TexturedMesh klein_bottle(int nu = 60, int nv = 24) {
         const double c = std::cos(turn / 2);
         const double s = std::sin(turn / 2);
         const double r = .025 + .01 * (c * std::sin(a) - s * std::sin(2 * a));
-        return Eigen::Vector3d(r * std::cos(turn), r * std::sin(turn), .01 * (s * std::sin(a) + c * std::sin(2 * a)));
+        return Eigen::Vector3d(r * std::cos(turn), r * std::sin(turn),
+                               .01 * (s * std::sin(a) + c * std::sin(2 * a)));
       },
       false, true);
   // The last column lies on the first one, upside down.
@@ -42,7 +44,8 @@ inline TexturedMesh needle_fan(int count = 2000) {
   for (int i = 0; i < count; ++i)
     mesh.vertices.emplace_back(.025 * std::cos(2 * kPi * i / count), .025 * std::sin(2 * kPi * i / count), 0);
   for (int i = 0; i < count; ++i)
-    mesh.triangles.push_back({0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % count)});
+    mesh.triangles.push_back(
+        {0, static_cast<std::uint32_t>(1 + i), static_cast<std::uint32_t>(1 + (i + 1) % count)});
   return finish(std::move(mesh));
 }
 
@@ -157,7 +160,8 @@ inline TexturedMesh many_holes(int n = 9) {
 inline TexturedMesh chord_trap(std::uint32_t corners = 24) {
   TexturedMesh mesh;
   for (std::uint32_t i = 0; i < corners; ++i)
-    mesh.vertices.emplace_back(.02 * std::cos(2 * kPi * i / corners), .02 * std::sin(2 * kPi * i / corners), 0);
+    mesh.vertices.emplace_back(.02 * std::cos(2 * kPi * i / corners), .02 * std::sin(2 * kPi * i / corners),
+                               0);
   for (std::uint32_t i = 1; i + 1 < corners; ++i) mesh.triangles.push_back({0, i, i + 1});
   return finish(std::move(mesh));
 }

@@ -19,13 +19,14 @@ struct LegLaw {
   }
 };
 
-inline double leg_end_s(const CellDescription& cell, const LegLaw& law, const Joints& from, const Joints& to) {
+inline double leg_end_s(const CellDescription& cell, const LegLaw& law, const Joints& from,
+                        const Joints& to) {
   return std::max(chain_move_s(cell, kRobotChain, law.robot(), from, to) + law.robot_late_s,
                   chain_move_s(cell, kTableChain, law.table(), from, to) + law.table_late_s);
 }
 
-inline Joints joints_on_leg(const CellDescription& cell, const LegLaw& law, const Joints& from, const Joints& to,
-                            double time_s) {
+inline Joints joints_on_leg(const CellDescription& cell, const LegLaw& law, const Joints& from,
+                            const Joints& to, double time_s) {
   Joints joints = to;
   put_chain(cell, kRobotChain, law.robot(), from, to, time_s - law.robot_late_s, joints);
   put_chain(cell, kTableChain, law.table(), from, to, time_s - law.table_late_s, joints);

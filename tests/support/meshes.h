@@ -35,7 +35,8 @@ inline void add_quad(TexturedMesh& mesh, std::uint32_t a, std::uint32_t b, std::
   mesh.triangles.push_back({a, c, d});
 }
 
-/// A grid of nu by nv quads over position(u, v), u and v in [0, 1], closed in u or v if set. Corner uv are (u, v).
+/// A grid of nu by nv quads over position(u, v), u and v in [0, 1], closed in u or v if set. Corner uv are
+/// (u, v).
 inline TexturedMesh grid(int nu, int nv, const std::function<Eigen::Vector3d(double, double)>& position,
                          bool closes_u = false, bool closes_v = false) {
   TexturedMesh mesh;
@@ -44,7 +45,9 @@ inline TexturedMesh grid(int nu, int nv, const std::function<Eigen::Vector3d(dou
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i)
       mesh.vertices.push_back(position(static_cast<double>(i) / nu, static_cast<double>(j) / nv));
-  const auto index = [&](int i, int j) { return static_cast<std::uint32_t>(j % rows * columns + i % columns); };
+  const auto index = [&](int i, int j) {
+    return static_cast<std::uint32_t>(j % rows * columns + i % columns);
+  };
   for (int j = 0; j < nv; ++j)
     for (int i = 0; i < nu; ++i) {
       add_quad(mesh, index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
@@ -62,7 +65,8 @@ inline TexturedMesh rectangle(double width_m, double height_m, int nu, int nv) {
   return grid(nu, nv, [=](double u, double v) { return Eigen::Vector3d(u * width_m, v * height_m, 0); });
 }
 
-/// A sheet 2 by 1 sides large, folded along its middle, the y axis: `angle` between its halves, the lower one on z = 0.
+/// A sheet 2 by 1 sides large, folded along its middle, the y axis: `angle` between its halves, the lower one
+/// on z = 0.
 inline TexturedMesh folded_sheet(double side_m, double angle, int nu, int nv) {
   return grid(2 * nu, nv, [=](double u, double v) {
     const double along = (2 * u - 1) * side_m;
@@ -87,7 +91,8 @@ inline TexturedMesh sphere(double radius_m, int nu = 48, int nv = 24) {
   const auto top = static_cast<std::uint32_t>(mesh.vertices.size() - 1);
   for (int i = 0; i < nu; ++i) {
     mesh.triangles.push_back({0, ring(1, i + 1), ring(1, i)});
-    for (int j = 1; j + 1 < nv; ++j) add_quad(mesh, ring(j, i), ring(j, i + 1), ring(j + 1, i + 1), ring(j + 1, i));
+    for (int j = 1; j + 1 < nv; ++j)
+      add_quad(mesh, ring(j, i), ring(j, i + 1), ring(j + 1, i + 1), ring(j + 1, i));
     mesh.triangles.push_back({top, ring(nv - 1, i), ring(nv - 1, i + 1)});
   }
   return finish(std::move(mesh));
@@ -98,18 +103,20 @@ inline TexturedMesh torus(double large_m = .03, double small_m = .012, int nu = 
       nu, nv,
       [=](double u, double v) {
         const double r = large_m + small_m * std::cos(2 * kPi * v);
-        return Eigen::Vector3d(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u), small_m * std::sin(2 * kPi * v));
+        return Eigen::Vector3d(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u),
+                               small_m * std::sin(2 * kPi * v));
       },
       true, true);
 }
 
-/// Open at both ends. needle_cylinder() has triangles as high as the cylinder and a thousandth as wide; even_cylinder()
-/// the same shape.
+/// Open at both ends. needle_cylinder() has triangles as high as the cylinder and a thousandth as wide;
+/// even_cylinder() the same shape.
 inline TexturedMesh cylinder(double radius_m, double height_m, int nu, int nv) {
   return grid(
       nu, nv,
       [=](double u, double v) {
-        return Eigen::Vector3d(radius_m * std::cos(2 * kPi * u), radius_m * std::sin(2 * kPi * u), v * height_m);
+        return Eigen::Vector3d(radius_m * std::cos(2 * kPi * u), radius_m * std::sin(2 * kPi * u),
+                               v * height_m);
       },
       true);
 }
@@ -182,7 +189,8 @@ inline TexturedMesh both(const TexturedMesh& a, const TexturedMesh& b,
   for (const auto& p : b.vertices) mesh.vertices.push_back(p + shift_b);
   for (auto t : b.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   mesh.corner_uv.insert(mesh.corner_uv.end(), b.corner_uv.begin(), b.corner_uv.end());
-  mesh.corner_luminance.insert(mesh.corner_luminance.end(), b.corner_luminance.begin(), b.corner_luminance.end());
+  mesh.corner_luminance.insert(mesh.corner_luminance.end(), b.corner_luminance.begin(),
+                               b.corner_luminance.end());
   mesh.material_index.insert(mesh.material_index.end(), b.material_index.begin(), b.material_index.end());
   return mesh;
 }

@@ -27,9 +27,9 @@ inline void halve_side(TexturedMesh& mesh, TriangleSide at, std::uint32_t middle
   mesh.corner_luminance[t][j] = mesh.corner_luminance[added][i] = luminance;
 }
 
-/// Halves the longest edges, round by round, until there are `triangle_count` triangles (or one more); the surface and
-/// its colors stay as they are. Edges are those between vertex indices: weld the mesh before. Numbered as a mesh of
-/// that size from a file would be.
+/// Halves the longest edges, round by round, until there are `triangle_count` triangles (or one more); the
+/// surface and its colors stay as they are. Edges are those between vertex indices: weld the mesh before.
+/// Numbered as a mesh of that size from a file would be.
 inline TexturedMesh subdivided(TexturedMesh mesh, std::size_t triangle_count) {
   while (mesh.triangles.size() < triangle_count) {
     const EdgeTable edges = edge_table(mesh.triangles);
@@ -45,7 +45,8 @@ inline TexturedMesh subdivided(TexturedMesh mesh, std::size_t triangle_count) {
       if (mesh.triangles.size() >= triangle_count || negative > .25 * order.front().first) break;
       const EdgeGroup& edge = edges.groups[index];
       bool is_free = true;
-      for (std::uint32_t i = edge.begin; i < edge.end; ++i) is_free = is_free && !is_halved[edges.sides[i].triangle];
+      for (std::uint32_t i = edge.begin; i < edge.end; ++i)
+        is_free = is_free && !is_halved[edges.sides[i].triangle];
       if (!is_free) continue;
       const auto middle = static_cast<std::uint32_t>(mesh.vertices.size());
       mesh.vertices.push_back(.5 * (mesh.vertices[edge.from] + mesh.vertices[edge.to]));

@@ -7,21 +7,23 @@
 #include "tests/support/shell.h"
 #include "tests/tidy/source_tree.h"
 
-/// Who may include whom: the house's floor plan, one row a library or a folder of one. The link targets in the
-/// CMakeLists.txt files hold the same rules for symbols; tests/tidy/draw_floor_plan prints what is really included.
+/// Who may include whom: the house's floor plan, one row a library or a folder of one. The link targets in
+/// the CMakeLists.txt files hold the same rules for symbols; tests/tidy/draw_floor_plan prints what is really
+/// included.
 namespace hilbrush::tidy {
 namespace fs = std::filesystem;
 
 struct FolderRule {
   const char* folder;  ///< and all below it; the longest one that fits a file counts
   std::vector<const char*>
-      ours;            ///< folders whose headers it may include; "folder/." is the folder without what is below
+      ours;  ///< folders whose headers it may include; "folder/." is the folder without what is below
   const char* others;  ///< regex over other people's headers, beside the standard library
 };
 
 constexpr const char* kRays = "Eigen/.*|embree3/.*|tbb/.*|oneapi/.*";
 constexpr const char* kPosix =
-    "(unistd|fcntl|poll|netdb|sched|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)/"
+    "(unistd|fcntl|poll|netdb|sched|termios|signal|pthread|dirent|spawn|pwd|grp)\\.h|(sys|netinet|arpa|linux)"
+    "/"
     "[a-z_]+\\.h";
 
 const std::vector<FolderRule>& folder_rules() {
@@ -30,24 +32,30 @@ const std::vector<FolderRule>& folder_rules() {
       {"sampling/options", {"sampling/options", "sampling/base"}, ""},
       // What meets bytes from outside knows nothing of what is done with a mesh.
       {"sampling/model", {"sampling/model", "sampling/base"}, "Eigen/.*|OpenMesh/.*|zlib\\.h|fmt/.*"},
-      {"sampling/images", {"sampling/images", "sampling/model", "sampling/base"}, "OpenImageIO/.*|Eigen/.*|zlib\\.h"},
+      {"sampling/images",
+       {"sampling/images", "sampling/model", "sampling/base"},
+       "OpenImageIO/.*|Eigen/.*|zlib\\.h"},
       {"sampling",
        {"sampling/.", "sampling/base", "sampling/options", "sampling/model", "sampling/dots", "sampling/disk",
-        "sampling/tone", "sampling/curve", "sampling/blue", "sampling/fine", "sampling/predictive", "sampling/gaps",
-        "sampling/laminar", "sampling/parametric", "sampling/quality"},
+        "sampling/tone", "sampling/curve", "sampling/blue", "sampling/fine", "sampling/predictive",
+        "sampling/gaps", "sampling/laminar", "sampling/parametric", "sampling/quality"},
        "(unsupported/)?Eigen/.*|tbb/.*|oneapi/.*|boost/polygon/.*|metis\\.h|fmt/.*"},
       {"planner/cell_model", {"planner/cell_model", "sampling/base"}, "Eigen/.*|POSIX|fmt/.*"},
-      {"planner", {"planner", "sampling/base", "sampling/model", "sampling/dots"}, "Eigen/.*|fmt/.*|tbb/.*|embree3/.*"},
+      {"planner",
+       {"planner", "sampling/base", "sampling/model", "sampling/dots"},
+       "Eigen/.*|fmt/.*|tbb/.*|embree3/.*"},
       {"drivers", {"drivers"}, "modbus/.*|modbus\\.h|libserialport\\.h|POSIX"},
       {"sim/script", {"sim/script"}, ""},
-      {"sim/devices", {"sim/devices", "drivers/.", "planner/cell_model", "sampling/base"}, "Eigen/.*|fmt/.*|POSIX"},
+      {"sim/devices",
+       {"sim/devices", "drivers/.", "planner/cell_model", "sampling/base"},
+       "Eigen/.*|fmt/.*|POSIX"},
       // The wires of real devices, with tables of their own: the drivers' codecs are what they test.
       {"sim/wire",
        {"sim/wire", "sim/script", "sim/devices", "drivers/.", "planner/cell_model", "sampling/base"},
        "fmt/.*|POSIX"},
       {"sim/film",
-       {"sim/film", "sim/devices", "sampling/.", "sampling/base", "sampling/options", "sampling/model", "sampling/dots",
-        "sampling/tone", "sampling/predictive", "sampling/images", "planner/cell_model"},
+       {"sim/film", "sim/devices", "sampling/.", "sampling/base", "sampling/options", "sampling/model",
+        "sampling/dots", "sampling/tone", "sampling/predictive", "sampling/images", "planner/cell_model"},
        kRays},
       {"config",
        {"config", "drivers/.", "sim/script", "planner/cell_model", "sampling/base", "sampling/options"},
@@ -57,8 +65,8 @@ const std::vector<FolderRule>& folder_rules() {
        {"daemon/execution", "config", "drivers", "sim/devices", "planner/cell_model", "sampling/base"},
        ".*"},
       {"daemon/server",
-       {"daemon/server", "daemon/execution", "config", "drivers", "sim/devices", "planner/cell_model", "sampling/base",
-        "sampling/options"},
+       {"daemon/server", "daemon/execution", "config", "drivers", "sim/devices", "planner/cell_model",
+        "sampling/base", "sampling/options"},
        ".*"},
       {"daemon/commands",
        {"daemon/commands", "daemon/execution", "config", "drivers", "planner/cell_model", "sampling/base",

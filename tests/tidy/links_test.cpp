@@ -6,8 +6,8 @@
 
 #include "tests/support/shell.h"
 
-/// What the light programs load when they start: the operator's command and the daemon must answer in milliseconds, so
-/// nothing heavy is linked.
+/// What the light programs load when they start: the operator's command and the daemon must answer in
+/// milliseconds, so nothing heavy is linked.
 namespace hilbrush::tidy {
 
 using testing_support::CommandResult;
@@ -41,8 +41,9 @@ std::set<std::string> loaded_libraries(const std::string& file) {
 }
 
 bool is_heavy(const std::string& library) {
-  static const std::regex kHeavy("lib(OpenImageIO|OpenMesh|embree|tbb|metis|opencv|OpenEXR|Imath|boost_filesystem).*",
-                                 std::regex::icase);
+  static const std::regex kHeavy(
+      "lib(OpenImageIO|OpenMesh|embree|tbb|metis|opencv|OpenEXR|Imath|boost_filesystem).*",
+      std::regex::icase);
   return std::regex_match(library, kHeavy);
 }
 
@@ -52,9 +53,11 @@ TEST_P(LightProgram, LinksNothingHeavy) {
   if (find_program("readelf").empty()) GTEST_SKIP() << "SKIPPED: readelf (package binutils) is not installed";
   const std::set<std::string> needed = needed_libraries(program(GetParam()));
   EXPECT_FALSE(needed.empty());
-  for (const std::string& library : needed) EXPECT_FALSE(is_heavy(library)) << GetParam() << " links " << library;
+  for (const std::string& library : needed)
+    EXPECT_FALSE(is_heavy(library)) << GetParam() << " links " << library;
   const std::set<std::string> loaded = loaded_libraries(program(GetParam()));
-  for (const std::string& library : loaded) EXPECT_FALSE(is_heavy(library)) << GetParam() << " loads " << library;
+  for (const std::string& library : loaded)
+    EXPECT_FALSE(is_heavy(library)) << GetParam() << " loads " << library;
   EXPECT_LE(loaded.size(), 30u) << GetParam() << ": hundreds of libraries take a second to load";
 }
 

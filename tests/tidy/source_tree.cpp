@@ -20,7 +20,8 @@ fs::path top_folder() {
 }
 
 bool is_ignored_name(const std::string& name) {
-  return name == ".git" || name.starts_with("build") || name == "compile_commands.json" || name.ends_with(".swp");
+  return name == ".git" || name.starts_with("build") || name == "compile_commands.json" ||
+         name.ends_with(".swp");
 }
 
 std::vector<std::string> all_files() {
@@ -30,9 +31,10 @@ std::vector<std::string> all_files() {
     if (entry.is_regular_file()) paths.push_back(entry.path().filename());
     if (!entry.is_directory()) continue;
     for (const fs::directory_entry& below : fs::recursive_directory_iterator(entry)) {
-      const bool is_leftover =
-          below.path().extension() == ".swp" || below.path().string().find("/__pycache__/") != std::string::npos;
-      if (below.is_regular_file() && !is_leftover) paths.push_back(fs::relative(below, top_folder()).generic_string());
+      const bool is_leftover = below.path().extension() == ".swp" ||
+                               below.path().string().find("/__pycache__/") != std::string::npos;
+      if (below.is_regular_file() && !is_leftover)
+        paths.push_back(fs::relative(below, top_folder()).generic_string());
     }
   }
   std::sort(paths.begin(), paths.end());
@@ -52,7 +54,8 @@ bool is_text_of_people(const std::string& path) {
   if (path.find("/corpus") != std::string::npos || path.find("/golden/") != std::string::npos) return false;
   if (path.starts_with("tests/data/")) return path.ends_with(".py");
   static constexpr std::array kBinary{".png", ".jpg", ".gif", ".tga", ".bmp", ".tif", ".gz"};
-  return std::none_of(kBinary.begin(), kBinary.end(), [&](const char* ending) { return path.ends_with(ending); });
+  return std::none_of(kBinary.begin(), kBinary.end(),
+                      [&](const char* ending) { return path.ends_with(ending); });
 }
 
 std::vector<SourceFile> read_source_files() {

@@ -23,8 +23,8 @@ std::string read_text(const std::filesystem::path& file);
 std::filesystem::path top_folder();
 /// Whether .gitignore leaves this name at the top out: build folders and what editors drop.
 bool is_ignored_name(const std::string& name);
-/// Every file of the project but the models, images and corpora that tests read: text that people wrote, sorted by
-/// path.
+/// Every file of the project but the models, images and corpora that tests read: text that people wrote,
+/// sorted by path.
 const std::vector<SourceFile>& source_files();
 /// Every file of the project, relative to the top, sorted.
 std::vector<std::string> all_files();

@@ -71,8 +71,8 @@ TEST(Text, FewLinesAreLong) {
       << "lines of more than " << kColumns << " columns, of " << count;
 }
 
-/// Words that a reader from outside would stumble over, with what to write instead. In pieces, or this file would find
-/// itself.
+/// Words that a reader from outside would stumble over, with what to write instead. In pieces, or this file
+/// would find itself.
 TEST(Text, PlainEnglish) {
   const std::vector<std::pair<std::string, std::string>> words{
       {"\\bk(Mo"

@@ -40,11 +40,14 @@ Json json_of(const Discrepancy& discrepancy) {
 }
 
 Json json_of(const Spectrum& spectrum, bool is_whole) {
-  Json json{{"below_half", spectrum.below_half}, {"below_quarter", spectrum.below_quarter}, {"peak", spectrum.peak}};
+  Json json{{"below_half", spectrum.below_half},
+            {"below_quarter", spectrum.below_quarter},
+            {"peak", spectrum.peak}};
   json["anisotropy"] = spectrum.directions.empty() ? Json(nullptr) : Json(spectrum.anisotropy);
   if (!is_whole) return json;
   Json rings = Json::array();
-  for (const Spectrum::Ring& ring : spectrum.rings) rings.push_back({ring.frequency, ring.power, ring.anisotropy});
+  for (const Spectrum::Ring& ring : spectrum.rings)
+    rings.push_back({ring.frequency, ring.power, ring.anisotropy});
   json["rings"] = std::move(rings);
   json["directions"] = spectrum.directions;
   return json;
@@ -69,8 +72,9 @@ Json json_of(const SizedFigures& figures, bool is_whole) {
   Json& discrepancy = json["discrepancy"] = Json::object();
   for (const auto& [shapes, value] : figures.discrepancy) discrepancy[shapes] = json_of(value);
   if (figures.spacing)
-    json["spacing"] = {
-        {"smallest", figures.spacing->smallest}, {"mean", figures.spacing->mean}, {"spread", figures.spacing->spread}};
+    json["spacing"] = {{"smallest", figures.spacing->smallest},
+                       {"mean", figures.spacing->mean},
+                       {"spread", figures.spacing->spread}};
   if (figures.largest_hole) json["largest_hole"] = *figures.largest_hole;
   if (figures.path_constant) json["path_constant"] = *figures.path_constant;
   json["spectrum"] = figures.spectrum ? json_of(*figures.spectrum, is_whole) : Json(nullptr);

@@ -37,7 +37,8 @@ constexpr std::array kModelSamplers{Sampler::kCentroid, Sampler::kJittered,     
 /// The same surface, black all over.
 TexturedMesh blackened(TexturedMesh mesh) {
   for (auto& luminance : mesh.corner_luminance) luminance = {0, 0, 0};
-  for (Material& material : mesh.materials) material = {material.name, ColorSource::kColors, -1, true, true, 1};
+  for (Material& material : mesh.materials)
+    material = {material.name, ColorSource::kColors, -1, true, true, 1};
   mesh.textures.clear();
   return mesh;
 }
@@ -58,7 +59,8 @@ class ModelSet : public MeasuredSet {
     options_.seed = request.seed;
     if (density_ != kConstant)
       notes.emplace_back(
-          "dots are compared with the tone that asks for them: shares by asked tone times area, lengths over the local "
+          "dots are compared with the tone that asks for them: shares by asked tone times area, lengths over "
+          "the local "
           "pitch");
   }
 
@@ -91,16 +93,18 @@ class ModelSet : public MeasuredSet {
 class DotsSet : public MeasuredSet {
  public:
   explicit DotsSet(const QualityRequest& request)
-      : settings_(job_settings_from_json(request.settings_json.empty() ? "{}" : request.settings_json, "$.settings")),
+      : settings_(job_settings_from_json(request.settings_json.empty() ? "{}" : request.settings_json,
+                                         "$.settings")),
         sequence_(read_dots(request.set)),
         mesh_(load(request.model, settings_)),
         tone_(mesh_, tone_of(settings_, mesh_)),
         surface_(mesh_, &tone_) {
     kind = "dots";
     if (sequence_.dots.empty()) throw InputError(request.set, "holds no dots");
-    for (const auto& [value, path] : {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
-                                      std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"},
-                                      std::pair{request.points, "$.points"}})
+    for (const auto& [value, path] :
+         {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
+          std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"},
+          std::pair{request.points, "$.points"}})
       if (!value.empty()) throw InputError(path, "has no effect on dots that are placed already");
     if (!request.counts.empty()) throw InputError("$.count", "has no effect on dots that are placed already");
     project_to_surface();
@@ -120,7 +124,8 @@ class DotsSet : public MeasuredSet {
     return with_curvature_density(repaired.mesh, settings.density);
   }
   static ToneOptions tone_of(const JobSettings& settings, const TexturedMesh& mesh) {
-    return job_tone(load_cell(find_cell(settings.cell)), settings, mesh).options;  // it warned when it was planned
+    return job_tone(load_cell(find_cell(settings.cell)), settings, mesh)
+        .options;  // it warned when it was planned
   }
 
   /// Finds the triangles of the dots, and refuses a model that they do not lie on.
@@ -135,8 +140,9 @@ class DotsSet : public MeasuredSet {
       if ((position(mesh_, point) - dot.position_O).norm() > tolerance_m) ++astray;
     }
     if (astray > 0)
-      throw InputError("$.model", std::to_string(astray) + " of " + std::to_string(sequence_.dots.size()) +
-                                      " dots do not lie on it: is it the model that was painted, at the same size?");
+      throw InputError("$.model",
+                       std::to_string(astray) + " of " + std::to_string(sequence_.dots.size()) +
+                           " dots do not lie on it: is it the model that was painted, at the same size?");
   }
 
   JobSettings settings_;

@@ -39,15 +39,18 @@ TexturedMesh triangles_of(const ParametricSurface& surface, int side) {
 
 class ParametricSet : public MeasuredSet {
  public:
-  ParametricSet(const QualityRequest& request, ParametricShape shape) : shape_(shape), formula_(make_surface(shape)) {
+  ParametricSet(const QualityRequest& request, ParametricShape shape)
+      : shape_(shape), formula_(make_surface(shape)) {
     kind = "surface";
     options_.sampler = sampler_choice(request.sampler, kParametricSamplers);
     options_.curve = curve_choice(request.curve);
     options_.area = choice_in(kAreaMethodNames, request.area, AreaMethod::kFirstFundamentalForm, "$.area");
-    options_.density = choice_in(kParametricDensityNames, request.density, ParametricDensity::kConstant, "$.density");
+    options_.density =
+        choice_in(kParametricDensityNames, request.density, ParametricDensity::kConstant, "$.density");
     options_.seed = request.seed;
     if (!request.points.empty()) use_point_set(request);
-    // 128 by 128 quads: the triangles of a sphere are off by 1.5e-4 of its radius. The plane needs only two triangles.
+    // 128 by 128 quads: the triangles of a sphere are off by 1.5e-4 of its radius. The plane needs only two
+    // triangles.
     mesh_ = triangles_of(*formula_, shape == ParametricShape::kPlane ? 1 : 128);
     if (options_.density == ParametricDensity::kConstant)
       surface_.emplace(mesh_);
@@ -83,14 +86,18 @@ class ParametricSet : public MeasuredSet {
   std::vector<std::uint64_t> default_counts() const override { return {10'000}; }
 
  private:
-  bool is_sphere() const { return shape_ == ParametricShape::kSphere || shape_ == ParametricShape::kEqualAreaSphere; }
+  bool is_sphere() const {
+    return shape_ == ParametricShape::kSphere || shape_ == ParametricShape::kEqualAreaSphere;
+  }
 
   void use_point_set(const QualityRequest& request) {
     if (shape_ != ParametricShape::kPlane && !is_sphere())
       throw InputError("$.points", "is for the plane and the sphere only");
-    for (const auto& [name, path] : {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
-                                     std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"}})
-      if (!name.empty()) throw InputError(path, "has no effect on points, which are not placed along a curve");
+    for (const auto& [name, path] :
+         {std::pair{request.sampler, "$.sampler"}, std::pair{request.curve, "$.curve"},
+          std::pair{request.area, "$.area"}, std::pair{request.density, "$.density"}})
+      if (!name.empty())
+        throw InputError(path, "has no effect on points, which are not placed along a curve");
     point_set_ = choice_in(kPlaneSetNames, request.points, PlaneSet::kRandom, "$.points");
   }
 

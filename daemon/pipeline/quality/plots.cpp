@@ -40,8 +40,14 @@ Plot spectrum_plot(const std::string& title, const Spectrum& spectrum) {
 }
 
 Plot direction_plot(const std::string& title, const Spectrum& spectrum) {
-  Plot plot{
-      "Power by direction at the principal frequency: " + title, "degrees from +x", "power", false, false, 0., {}, {}};
+  Plot plot{"Power by direction at the principal frequency: " + title,
+            "degrees from +x",
+            "power",
+            false,
+            false,
+            0.,
+            {},
+            {}};
   PlotSeries series;
   const double step = 180 / static_cast<double>(spectrum.directions.size());
   for (std::size_t i = 0; i < spectrum.directions.size(); ++i)
@@ -82,7 +88,8 @@ Plot neighbor_plot(const std::string& title, const Spacing& spacing) {
             {},
             {}};
   PlotSeries series{"", {}, PlotSeries::Style::kBars};
-  for (std::size_t i = 0; i < kBars; ++i) series.points.emplace_back((static_cast<double>(i) + .5) * step, shares[i]);
+  for (std::size_t i = 0; i < kBars; ++i)
+    series.points.emplace_back((static_cast<double>(i) + .5) * step, shares[i]);
   plot.series.push_back(std::move(series));
   return plot;
 }
@@ -97,7 +104,8 @@ PointPicture picture_of(const MeasuredDots& dots) {
   } else {
     const double turn = kTurn_deg * kDegree;
     const double height = kHeight_deg * kDegree;
-    const Vector3d eye(std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn), std::sin(height));
+    const Vector3d eye(std::cos(height) * std::cos(turn), std::cos(height) * std::sin(turn),
+                       std::sin(height));
     for (const Dot& dot : dots.dots)
       if (dot.normal_O.isZero() || dot.normal_O.cast<double>().dot(eye) > 0)
         picture.points.push_back(project(dot.position_O, kTurn_deg, kHeight_deg));
@@ -141,7 +149,8 @@ std::vector<std::string> write_plots(const std::string& title, const std::vector
   return files;
 }
 
-std::string write_coherence(PlaneCurve curve, const Coherence& coherence, const std::filesystem::path& output) {
+std::string write_coherence(PlaneCurve curve, const Coherence& coherence,
+                            const std::filesystem::path& output) {
   const std::string name = plane_curve_name(curve);
   Plot plot{"Spatial coherence of " + name,
             "straight distance",

@@ -46,7 +46,8 @@ std::string title_of(const QualityRequest& request) {
 Json measure_coherence(const QualityRequest& request, const std::filesystem::path& output,
                        std::vector<std::string>& files) {
   Json json = Json::object();
-  for (const PlaneCurve curve : {PlaneCurve::kHilbert, PlaneCurve::kPeano2, PlaneCurve::kZ, PlaneCurve::kRows}) {
+  for (const PlaneCurve curve :
+       {PlaneCurve::kHilbert, PlaneCurve::kPeano2, PlaneCurve::kZ, PlaneCurve::kRows}) {
     const int depth = curve == PlaneCurve::kPeano2 ? 9 : 12;  // as in the thesis
     const Coherence coherence = spatial_coherence(curve, depth, {request.shapes, request.seed});
     json[plane_curve_name(curve)] = {{"correlation", coherence.correlation}, {"hoelder", coherence.hoelder}};
@@ -81,7 +82,8 @@ QualityRequest quality_request_from_json(const std::string& text) {
     request.seed = json.optional_integer("seed", 0, ~std::uint64_t{0} >> 1).value_or(1);
     request.shapes = json.optional_integer("shapes", 1, 1'000'000).value_or(1000);
     if (json.has("count"))
-      for (const double count : json.numbers("count", 1, kMaxCounts, {1, static_cast<double>(kMaxMeasuredDots)}))
+      for (const double count :
+           json.numbers("count", 1, kMaxCounts, {1, static_cast<double>(kMaxMeasuredDots)}))
         request.counts.push_back(static_cast<std::uint64_t>(count));
   });
   return request;
@@ -110,7 +112,8 @@ std::string run_quality(const QualityRequest& request, const std::filesystem::pa
 
   report_progress("images", 0);
   Json json{{"set", json_of(request, *set)}, {"sizes", Json::array()}};
-  for (const SizedFigures& figures : sizes) json["sizes"].push_back(json_of(figures, &figures == &sizes.back()));
+  for (const SizedFigures& figures : sizes)
+    json["sizes"].push_back(json_of(figures, &figures == &sizes.back()));
   if (const Json slopes = slopes_of(sizes); !slopes.empty()) json["slopes"] = slopes;
   std::vector<std::string> files = write_plots(title_of(request), sizes, dots, output);
   if (!dots.plane_points.empty()) json["coherence"] = measure_coherence(request, output, files);
@@ -132,7 +135,8 @@ std::unique_ptr<MeasuredSet> make_measured_set(const QualityRequest& request) {
   if (std::filesystem::exists(request.set, error)) return make_model_set(request);
   std::string known;
   for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-  throw InputError("$.set", "there is no file \"" + request.set + "\" and no surface of that name; known are " + known);
+  throw InputError(
+      "$.set", "there is no file \"" + request.set + "\" and no surface of that name; known are " + known);
 }
 
 std::size_t choice_of(const std::string& name, const std::vector<std::string>& names, std::size_t otherwise,

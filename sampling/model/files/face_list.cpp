@@ -26,7 +26,8 @@ bool is_usable(const Vector3d& p) {
 }  // namespace
 
 float luminance_of_srgb(double red, double green, double blue) {
-  return static_cast<float>(.2126 * linear_of_srgb(red) + .7152 * linear_of_srgb(green) + .0722 * linear_of_srgb(blue));
+  return static_cast<float>(.2126 * linear_of_srgb(red) + .7152 * linear_of_srgb(green) +
+                            .0722 * linear_of_srgb(blue));
 }
 
 std::vector<Vector2d> bounding_box_mapping(const std::vector<Vector3d>& points,
@@ -73,7 +74,8 @@ std::uint32_t MeshBuilder::material_of(const FaceList& faces, const Look& look) 
                         material.repeat_v,
                         material.opacity,
                         material.name};
-  const auto [found, is_new] = material_indices_.try_emplace(key, static_cast<std::uint32_t>(mesh_.materials.size()));
+  const auto [found, is_new] =
+      material_indices_.try_emplace(key, static_cast<std::uint32_t>(mesh_.materials.size()));
   if (is_new) mesh_.materials.push_back(std::move(material));
   return found->second;
 }
@@ -110,7 +112,8 @@ void MeshBuilder::add(const FaceList& faces, const Eigen::Affine3d& X, const Loo
     begin = end;
     if (!is_usable_face) continue;
     if (mesh_.triangles.size() + kept_.size() - 2 > limits_.triangles)
-      throw InputError(faces.at, "the model has more triangles than the limit of " + std::to_string(limits_.triangles));
+      throw InputError(faces.at,
+                       "the model has more triangles than the limit of " + std::to_string(limits_.triangles));
     for (const auto& [a, b, c] : cutter_.cut(outline_)) {
       add_triangle(*source, look, {kept_[a], kept_[b], kept_[c]}, is_flipped, vertex_of_point);
       mesh_.material_index.push_back(material);
@@ -141,8 +144,9 @@ bool MeshBuilder::take_outline(const FaceList& faces, std::size_t begin, std::si
   return true;
 }
 
-void MeshBuilder::add_triangle(const FaceList& faces, const Look& look, const std::array<std::size_t, 3>& corners,
-                               bool is_flipped, const std::vector<std::uint32_t>& vertex_of_point) {
+void MeshBuilder::add_triangle(const FaceList& faces, const Look& look,
+                               const std::array<std::size_t, 3>& corners, bool is_flipped,
+                               const std::vector<std::uint32_t>& vertex_of_point) {
   std::array<std::uint32_t, 3> triangle{};
   std::array<Vector2d, 3> uv{Vector2d::Zero(), Vector2d::Zero(), Vector2d::Zero()};
   std::array<float, 3> luminance{};
@@ -162,10 +166,12 @@ void MeshBuilder::add_triangle(const FaceList& faces, const Look& look, const st
 
 TexturedMesh MeshBuilder::finish(std::vector<std::string>& warnings) {
   if (short_face_count_ > 0)
-    warnings.push_back(first_short_face_ + ": " + std::to_string(short_face_count_) +
-                       " faces with fewer than three different corners were dropped (this is the first place)");
+    warnings.push_back(
+        first_short_face_ + ": " + std::to_string(short_face_count_) +
+        " faces with fewer than three different corners were dropped (this is the first place)");
   if (infinite_face_count_ > 0)
-    warnings.push_back(std::to_string(infinite_face_count_) + " faces with coordinates out of range were dropped");
+    warnings.push_back(std::to_string(infinite_face_count_) +
+                       " faces with coordinates out of range were dropped");
   if (cutter_.given_up() > 0)
     warnings.push_back(std::to_string(cutter_.given_up()) + " huge concave faces were cut into fans");
   return std::move(mesh_);

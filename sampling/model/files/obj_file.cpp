@@ -12,8 +12,8 @@
 #include "sampling/model/files/text_lines.h"
 #include "sampling/model/model_images.h"
 
-/// OBJ: v, vt, f, usemtl and mtllib lines; the others say nothing of the surface. Indices are relative to where they
-/// stand or absolute.
+/// OBJ: v, vt, f, usemtl and mtllib lines; the others say nothing of the surface. Indices are relative to
+/// where they stand or absolute.
 namespace hilbrush {
 namespace {
 
@@ -93,11 +93,13 @@ class ObjReader {
                                   std::to_string(points().size()) + " points have no color; they are white");
     if (colored_count_ > 0) set_colors();
     if (dropped_count_ > 0)
-      content_.warnings.push_back(at(first_dropped_) + ": " + std::to_string(dropped_count_) +
-                                  " faces were dropped: they name points that do not exist (this is the first)");
+      content_.warnings.push_back(
+          at(first_dropped_) + ": " + std::to_string(dropped_count_) +
+          " faces were dropped: they name points that do not exist (this is the first)");
     if (short_count_ > 0)
-      content_.warnings.push_back(at(first_short_) + ": " + std::to_string(short_count_) +
-                                  " faces with fewer than three different corners were dropped (this is the first)");
+      content_.warnings.push_back(
+          at(first_short_) + ": " + std::to_string(short_count_) +
+          " faces with fewer than three different corners were dropped (this is the first)");
     content_.faces.at = name_;
     return std::move(content_);
   }
@@ -109,14 +111,17 @@ class ObjReader {
 
   void add_vertex(std::string_view rest) {
     if (points().size() >= 3 * limits_.triangles)
-      throw InputError(at(lines_.number()),
-                       "the model has more points than the limit of " + std::to_string(3 * limits_.triangles));
+      throw InputError(at(lines_.number()), "the model has more points than the limit of " +
+                                                std::to_string(3 * limits_.triangles));
     std::array<std::optional<double>, 6> numbers;
     for (auto& number : numbers) number = number_in<double>(take_word(rest));
     if (!numbers[0] || !numbers[1] || !numbers[2])
       throw InputError(at(lines_.number()), "expected three coordinates after v");
-    points().emplace_back(*numbers[0], *numbers[1], *numbers[2]);  // faces of what is not finite are dropped later
-    const auto is_channel = [](const std::optional<double>& number) { return number && std::isfinite(*number); };
+    points().emplace_back(*numbers[0], *numbers[1],
+                          *numbers[2]);  // faces of what is not finite are dropped later
+    const auto is_channel = [](const std::optional<double>& number) {
+      return number && std::isfinite(*number);
+    };
     const bool is_colored = std::all_of(numbers.begin() + 3, numbers.end(), is_channel);
     colored_count_ += is_colored;
     luminances_.push_back(is_colored ? luminance_of_srgb(*numbers[3], *numbers[4], *numbers[5]) : 1);
@@ -159,11 +164,14 @@ class ObjReader {
       const std::size_t uv = t ? absolute(*t, texture_vertices_.size()) : 0;
       is_good = is_good && point > 0;
       has_uv = has_uv && uv > 0;
-      // A point that a face visits twice is taken once: faces with spikes and bridges are common, and repaired so.
-      const bool is_again = std::any_of(corners_.begin(), corners_.end(), [&](const auto& c) { return c[0] == point; });
+      // A point that a face visits twice is taken once: faces with spikes and bridges are common, and
+      // repaired so.
+      const bool is_again =
+          std::any_of(corners_.begin(), corners_.end(), [&](const auto& c) { return c[0] == point; });
       if (!is_again || !is_good) corners_.push_back({point, uv});
       if (corners_.size() > kCornerLimit)
-        throw InputError(at(lines_.number()), "a face has more than " + std::to_string(kCornerLimit) + " corners");
+        throw InputError(at(lines_.number()),
+                         "a face has more than " + std::to_string(kCornerLimit) + " corners");
     }
     if (!is_good) {
       if (dropped_count_++ == 0) first_dropped_ = lines_.number();
@@ -180,7 +188,8 @@ class ObjReader {
     add_corners(has_uv);
   }
 
-  /// Faces before the first one with texture coordinates have none, and so do faces with an index that has none.
+  /// Faces before the first one with texture coordinates have none, and so do faces with an index that has
+  /// none.
   void add_corners(bool has_uv) {
     FaceList& faces = content_.faces;
     if (has_uv) faces.corner_uv.resize(faces.corners.size(), Eigen::Vector2d::Zero());
@@ -193,7 +202,8 @@ class ObjReader {
   }
 
   void use_material(const std::string& material) {
-    const auto [found, is_new] = known_.try_emplace(material, static_cast<std::uint32_t>(content_.materials.size()));
+    const auto [found, is_new] =
+        known_.try_emplace(material, static_cast<std::uint32_t>(content_.materials.size()));
     if (is_new) content_.materials.push_back(material);
     if (content_.materials.size() > kMaterialLimit)
       throw InputError(at(lines_.number()),
@@ -226,8 +236,9 @@ std::string_view texture_name(std::string_view rest) {
   while (!rest.empty() && rest.front() == '-') {
     std::string_view after = rest;
     const std::string_view option = take_word(after);
-    const bool takes_word = option == "-clamp" || option == "-blendu" || option == "-blendv" || option == "-cc" ||
-                            option == "-imfchan" || option == "-texres" || option == "-bm" || option == "-boost";
+    const bool takes_word = option == "-clamp" || option == "-blendu" || option == "-blendv" ||
+                            option == "-cc" || option == "-imfchan" || option == "-texres" ||
+                            option == "-bm" || option == "-boost";
     const bool takes_numbers = option == "-s" || option == "-o" || option == "-t" || option == "-mm";
     if (!takes_word && !takes_numbers) break;
     if (takes_word) take_word(after);
@@ -243,7 +254,8 @@ void read_mtl(std::string_view text, std::map<std::string, MtlMaterial>& materia
   while (const auto line = take_line(text)) {
     std::string_view rest = *line;
     const std::string_view key = take_word(rest);
-    if (key == "newmtl" && materials.size() < kMaterialLimit) current = &(materials[std::string(trimmed(rest))] = {});
+    if (key == "newmtl" && materials.size() < kMaterialLimit)
+      current = &(materials[std::string(trimmed(rest))] = {});
     if (!current) continue;
     if (key == "Kd") {
       std::array<double, 3> color{};
@@ -256,7 +268,8 @@ void read_mtl(std::string_view text, std::map<std::string, MtlMaterial>& materia
       if (is_good) current->diffuse = color;
     } else if (key == "d" || key == "Tr") {
       const auto number = number_in<double>(take_word(rest));
-      // Some exporters write the opacity as Tr. A Tr of 1 would be an invisible surface: it is taken as opaque.
+      // Some exporters write the opacity as Tr. A Tr of 1 would be an invisible surface: it is taken as
+      // opaque.
       const bool is_meant = number && std::isfinite(*number) && !(key == "Tr" && *number >= 1);
       if (is_meant) current->opacity = std::clamp(key == "d" ? *number : 1 - *number, 0., 1.);
     } else if (key == "map_Kd") {
@@ -276,7 +289,8 @@ std::map<std::string, MtlMaterial> read_libraries(const ObjContent& content, con
     if (!folder.find(folder.path(), library)) {
       names.clear();
       std::string_view rest = library;
-      for (std::string_view word; !(word = take_word(rest)).empty() && names.size() < 16;) names.emplace_back(word);
+      for (std::string_view word; !(word = take_word(rest)).empty() && names.size() < 16;)
+        names.emplace_back(word);
     }
     for (const std::string& each : names) {
       const auto file = folder.find(folder.path(), each);
@@ -307,7 +321,8 @@ std::vector<Look> looks_of(const ObjContent& content, const std::string& name, M
     look.opacity = material.opacity;
     if (material.diffuse) {
       look.source = ColorSource::kMaterial;
-      look.luminance = luminance_of_srgb((*material.diffuse)[0], (*material.diffuse)[1], (*material.diffuse)[2]);
+      look.luminance =
+          luminance_of_srgb((*material.diffuse)[0], (*material.diffuse)[1], (*material.diffuse)[2]);
     }
     if (material.texture.empty()) continue;
     const auto [texture, is_new] = textures.try_emplace(material.texture, -1);
@@ -325,11 +340,12 @@ std::vector<Look> looks_of(const ObjContent& content, const std::string& name, M
 }
 
 /// The faces of one material, as a list of its own.
-std::vector<FaceList> split_by_material(const FaceList& faces, const std::vector<std::uint32_t>& material_of_face,
+std::vector<FaceList> split_by_material(const FaceList& faces,
+                                        const std::vector<std::uint32_t>& material_of_face,
                                         std::size_t material_count) {
   std::vector<FaceList> lists(material_count);
-  // Points are shared by few materials: the index in the last owner's list is remembered, others get a copy, welded
-  // later.
+  // Points are shared by few materials: the index in the last owner's list is remembered, others get a copy,
+  // welded later.
   std::vector<std::uint32_t> owner(faces.points.size(), 0);
   std::vector<std::uint32_t> index(faces.points.size(), 0);
   for (std::size_t f = 0, c = 0; f < faces.face_ends.size(); ++f) {
@@ -365,8 +381,10 @@ Model load_obj(std::string text, const std::string& name, ModelFolder& folder, c
   Model model;
   model.warnings = std::move(content.warnings);
   MeshBuilder builder(limits);
-  const std::vector<Look> looks = looks_of(content, name, folder, read_image, limits, builder, model.warnings);
-  const std::vector<FaceList> lists = split_by_material(content.faces, content.material_of_face, looks.size());
+  const std::vector<Look> looks =
+      looks_of(content, name, folder, read_image, limits, builder, model.warnings);
+  const std::vector<FaceList> lists =
+      split_by_material(content.faces, content.material_of_face, looks.size());
   for (std::size_t m = 0; m < lists.size(); ++m)
     if (!lists[m].face_ends.empty()) builder.add(lists[m], Eigen::Affine3d::Identity(), looks[m]);
   model.mesh = builder.finish(model.warnings);

@@ -97,8 +97,8 @@ class OffNumbers {
   std::string_view rest_;
 };
 
-/// Color at the end of a line: three or four numbers, whole ones up to 255 or fractions up to 1. Its luminance; null if
-/// there is none.
+/// Color at the end of a line: three or four numbers, whole ones up to 255 or fractions up to 1. Its
+/// luminance; null if there is none.
 std::optional<float> read_color(std::string_view rest) {
   std::array<double, 3> channels{};
   bool is_fraction = false;
@@ -123,7 +123,9 @@ void add_color(const std::optional<float>& luminance, std::size_t index, std::ve
 void read_vertices(OffLines& lines, const Header& header, PolygonList& polygons) {
   OffNumbers numbers(lines);
   for (std::size_t i = 0; i < header.vertices; ++i) {
-    const auto vertex = [&] { return "vertex " + std::to_string(i + 1) + " of " + std::to_string(header.vertices); };
+    const auto vertex = [&] {
+      return "vertex " + std::to_string(i + 1) + " of " + std::to_string(header.vertices);
+    };
     Eigen::Vector3d p;
     for (double& coordinate : p) coordinate = numbers.take<double>(vertex);
     polygons.points.push_back(p);
@@ -141,8 +143,11 @@ void read_faces(OffLines& lines, const Header& header, const std::string& name, 
     const auto face = [&] { return "face " + std::to_string(i + 1) + " of " + std::to_string(header.faces); };
     const auto count = numbers.take<std::uint32_t>(face);
     polygons.check_room(count, name, limits);
-    const auto corners = [&] { return "the indices of the " + std::to_string(count) + " corners of " + face(); };
-    for (std::uint32_t c = 0; c < count; ++c) polygons.corners.push_back(numbers.take<std::uint32_t>(corners));
+    const auto corners = [&] {
+      return "the indices of the " + std::to_string(count) + " corners of " + face();
+    };
+    for (std::uint32_t c = 0; c < count; ++c)
+      polygons.corners.push_back(numbers.take<std::uint32_t>(corners));
     polygons.face_ends.push_back(polygons.corners.size());
     add_color(read_color(numbers.take_rest()), i, polygons.face_luminance);
   }

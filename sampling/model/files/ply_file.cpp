@@ -10,8 +10,8 @@
 #include "sampling/model/files/text_lines.h"
 #include "sampling/model/model_images.h"
 
-/// PLY, as text and binary. The header says what each entry of each element holds; the body is read entry by entry into
-/// the few values that are understood. No count is believed: the file must hold what it promises.
+/// PLY, as text and binary. The header says what each entry of each element holds; the body is read entry by
+/// entry into the few values that are understood. No count is believed: the file must hold what it promises.
 namespace hilbrush {
 namespace {
 
@@ -83,8 +83,9 @@ bool is_floating(PlyType type) {
 }
 
 Meaning meaning_of(const std::string& name, bool is_list) {
-  static const std::map<std::string, Meaning> lists{
-      {"vertex_indices", Meaning::kIndices}, {"vertex_index", Meaning::kIndices}, {"texcoord", Meaning::kCornerUv}};
+  static const std::map<std::string, Meaning> lists{{"vertex_indices", Meaning::kIndices},
+                                                    {"vertex_index", Meaning::kIndices},
+                                                    {"texcoord", Meaning::kCornerUv}};
   static const std::map<std::string, Meaning> scalars{{"x", Meaning::kX},
                                                       {"y", Meaning::kY},
                                                       {"z", Meaning::kZ},
@@ -130,11 +131,12 @@ class HeaderReader {
       } else if (key == "property") {
         read_property(line);
       } else if (!key.empty()) {
-        fail("expected format, comment, element, property or end_header, found '" + std::string(key.substr(0, 40)) +
-             "'");
+        fail("expected format, comment, element, property or end_header, found '" +
+             std::string(key.substr(0, 40)) + "'");
       }
     }
-    if (header_.format != "ascii" && header_.format != "binary_little_endian" && header_.format != "binary_big_endian")
+    if (header_.format != "ascii" && header_.format != "binary_little_endian" &&
+        header_.format != "binary_big_endian")
       fail("the format must be ascii, binary_little_endian or binary_big_endian");
     header_.body = text_.size() - rest_.size();
     return std::move(header_);
@@ -152,7 +154,8 @@ class HeaderReader {
   }
   void read_comment(std::string_view line) {
     const std::string_view key = take_word(line);
-    if (key == "TextureFile" && header_.textures.size() < kTextureLimit) header_.textures.emplace_back(trimmed(line));
+    if (key == "TextureFile" && header_.textures.size() < kTextureLimit)
+      header_.textures.emplace_back(trimmed(line));
   }
   void read_element(std::string_view line) {
     PlyElement element;
@@ -179,7 +182,8 @@ class HeaderReader {
     }
     property.type = type_named(type);
     const std::string name(take_word(line));
-    if (property.type == PlyType::kNone) fail("the type '" + std::string(type.substr(0, 40)) + "' is unknown");
+    if (property.type == PlyType::kNone)
+      fail("the type '" + std::string(type.substr(0, 40)) + "' is unknown");
     if (name.empty()) fail("a property has no name");
     property.meaning = meaning_of(name, is_list);
     auto& properties = header_.elements.back().properties;
@@ -251,15 +255,18 @@ void check_header(const PlyHeader& header, const std::string& name, std::size_t 
   }
   // The last number of an ASCII file need not be followed by a blank.
   if (least_bytes > body_bytes + 1)
-    fail(name, "its header promises more than the file holds (" + std::to_string(least_bytes) + " bytes at least, " +
-                   std::to_string(body_bytes) + " found)");
+    fail(name, "its header promises more than the file holds (" + std::to_string(least_bytes) +
+                   " bytes at least, " + std::to_string(body_bytes) + " found)");
 }
 
 /// The numbers of a body, one after another.
 class BodyReader {
  public:
   BodyReader(std::string_view body, const std::string& format, const std::string& name)
-      : rest_(body), is_text_(format == "ascii"), is_big_endian_(format == "binary_big_endian"), name_(name) {}
+      : rest_(body),
+        is_text_(format == "ascii"),
+        is_big_endian_(format == "binary_big_endian"),
+        name_(name) {}
 
   /// @throws InputError at the end of the file, or at what is not a number.
   double take(PlyType type) {
@@ -314,8 +321,8 @@ class BodyReader {
   const std::string& name_;
 };
 
-/// A channel of a color, 0 to 1: whole numbers run up to the greatest of their type, or, as exporters write integers,
-/// to 255.
+/// A channel of a color, 0 to 1: whole numbers run up to the greatest of their type, or, as exporters write
+/// integers, to 255.
 double channel_of(double value, PlyType type) {
   if (is_floating(type)) return value;
   return value / (type == PlyType::kUint16 ? 65535 : 255);
@@ -379,7 +386,8 @@ class SurfaceReader {
   void add_point(const PlyElement& element, const Entry& entry) {
     polygons_.points.emplace_back(entry[Meaning::kX], entry[Meaning::kY], entry[Meaning::kZ]);
     if (has_property(&element, Meaning::kRed)) polygons_.point_luminance.push_back(entry.luminance());
-    if (has_property(&element, Meaning::kU)) polygons_.point_uv.emplace_back(entry[Meaning::kU], entry[Meaning::kV]);
+    if (has_property(&element, Meaning::kU))
+      polygons_.point_uv.emplace_back(entry[Meaning::kU], entry[Meaning::kV]);
   }
 
   void add_face(const PlyElement& element, const Entry& entry) {
@@ -395,7 +403,8 @@ class SurfaceReader {
       polygons_.corner_uv.emplace_back(entry.corner_uv[2 * c], entry.corner_uv[2 * c + 1]);
   }
 
-  /// Each point makes a triangle with the two before it, every second one the other way around; -1 begins a new strip.
+  /// Each point makes a triangle with the two before it, every second one the other way around; -1 begins a
+  /// new strip.
   void add_strips(const Entry& entry) {
     std::size_t length = 0;
     for (std::size_t i = 0; i < entry.indices.size(); ++i) {
@@ -441,7 +450,8 @@ int add_texture(const PlyHeader& header, const std::string& name, bool has_uv, M
   }
   if (index < 0) return -1;
   if (header.textures.size() > 1)
-    warnings.push_back(name + ": only one of the " + std::to_string(header.textures.size()) + " textures is used");
+    warnings.push_back(name + ": only one of the " + std::to_string(header.textures.size()) +
+                       " textures is used");
   if (has_uv) return index;
   warnings.push_back(name + ": the texture is not used, as there are no texture coordinates");
   return -1;
@@ -464,8 +474,8 @@ Model load_ply(std::string text, const std::string& name, ModelFolder& folder, c
                              " faces were dropped: they name points that do not exist");
   MeshBuilder builder(limits);
   Look look;
-  look.texture =
-      add_texture(header, name, !faces.corner_uv.empty(), folder, read_image, limits, builder, model.warnings);
+  look.texture = add_texture(header, name, !faces.corner_uv.empty(), folder, read_image, limits, builder,
+                             model.warnings);
   builder.add(faces, Eigen::Affine3d::Identity(), look);
   model.mesh = builder.finish(model.warnings);
   if (model.mesh.triangles.empty()) fail(name, "there is no usable face in it");

@@ -99,7 +99,9 @@ bool PolygonCutter::is_ear(std::size_t corner) const {
 }
 
 void PolygonCutter::cut_ears() {
-  const auto is_reflex = [&](std::size_t i) { return !(turn(flat_[previous_[i]], flat_[i], flat_[next_[i]]) > 0); };
+  const auto is_reflex = [&](std::size_t i) {
+    return !(turn(flat_[previous_[i]], flat_[i], flat_[next_[i]]) > 0);
+  };
   reflex_.clear();
   for (std::size_t i = 0; i < flat_.size(); ++i)
     if (is_reflex(i)) reflex_.push_back(i);
@@ -129,8 +131,9 @@ void PolygonCutter::cut_ears() {
     misses = 0;
     // Only the two neighbors change, and a convex corner never turns reflex by cutting an ear.
     work_ += reflex_.size();
-    std::erase_if(reflex_,
-                  [&](std::size_t i) { return (i == previous_[corner] || i == next_[corner]) && !is_reflex(i); });
+    std::erase_if(reflex_, [&](std::size_t i) {
+      return (i == previous_[corner] || i == next_[corner]) && !is_reflex(i);
+    });
     corner = next_[next_[corner]];
   }
   fan_rest(corner, count);
@@ -138,7 +141,8 @@ void PolygonCutter::cut_ears() {
 
 void PolygonCutter::fan_rest(std::size_t start, std::size_t count) {
   std::size_t corner = next_[start];
-  for (std::size_t i = 2; i < count; ++i, corner = next_[corner]) triangles_.push_back({start, corner, next_[corner]});
+  for (std::size_t i = 2; i < count; ++i, corner = next_[corner])
+    triangles_.push_back({start, corner, next_[corner]});
 }
 
 }  // namespace hilbrush

@@ -11,10 +11,10 @@ class PolygonCutter {
  public:
   using Triangle = std::array<std::size_t, 3>;
 
-  /// `corners` in order; the triangles index it and keep its orientation. A convex polygon is fanned, any other has its
-  /// ears cut (Meisters 1975) in the plane of its Newell normal. Where rounding or self-crossing leaves no ear, the
-  /// rest is fanned. The result is valid until the next call. Cost: O(n) convex, else O(n r) with r reflex corners,
-  /// bounded by `kWorkLimit`.
+  /// `corners` in order; the triangles index it and keep its orientation. A convex polygon is fanned, any
+  /// other has its ears cut (Meisters 1975) in the plane of its Newell normal. Where rounding or
+  /// self-crossing leaves no ear, the rest is fanned. The result is valid until the next call. Cost: O(n)
+  /// convex, else O(n r) with r reflex corners, bounded by `kWorkLimit`.
   const std::vector<Triangle>& cut(const std::vector<Eigen::Vector3d>& corners);
 
   /// Polygons that were too large to cut properly and were fanned.

@@ -6,9 +6,11 @@
 
 namespace hilbrush {
 
-void PolygonList::check_room(std::size_t corner_count, const std::string& at, const ModelLimits& limits) const {
+void PolygonList::check_room(std::size_t corner_count, const std::string& at,
+                             const ModelLimits& limits) const {
   constexpr std::size_t kCornersPerTriangle = 8;
-  if (face_ends.size() >= limits.triangles || corners.size() + corner_count > kCornersPerTriangle * limits.triangles)
+  if (face_ends.size() >= limits.triangles ||
+      corners.size() + corner_count > kCornersPerTriangle * limits.triangles)
     throw InputError(at, "the model has more faces than the limit of " + std::to_string(limits.triangles));
 }
 

@@ -9,8 +9,8 @@
 
 namespace hilbrush {
 
-/// Polygons as PLY and OFF have them: colors and texture coordinates belong to points or to faces, and any index may
-/// name a point that does not exist. What is empty was not given.
+/// Polygons as PLY and OFF have them: colors and texture coordinates belong to points or to faces, and any
+/// index may name a point that does not exist. What is empty was not given.
 struct PolygonList {
   static constexpr std::uint32_t kNoPoint = std::numeric_limits<std::uint32_t>::max();
 
@@ -20,7 +20,7 @@ struct PolygonList {
   std::vector<std::uint32_t> corners;
   std::vector<std::size_t> face_ends;      ///< of each face: one past its last corner
   std::vector<Eigen::Vector2d> corner_uv;  ///< goes before point_uv; may end early: the rest is zero
-  std::vector<float> face_luminance;       ///< point_luminance goes before it; may end early: the rest is white
+  std::vector<float> face_luminance;  ///< point_luminance goes before it; may end early: the rest is white
 
   /// @throws InputError at `at` if the limits allow no further face with this many corners.
   void check_room(std::size_t corner_count, const std::string& at, const ModelLimits& limits) const;

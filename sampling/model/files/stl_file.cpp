@@ -10,7 +10,8 @@
 #include "sampling/model/files/mesh_file.h"
 #include "sampling/model/files/text_lines.h"
 
-/// STL. A binary file's count is checked against its size; triangles that are not finite are left out and counted.
+/// STL. A binary file's count is checked against its size; triangles that are not finite are left out and
+/// counted.
 namespace hilbrush {
 namespace {
 
@@ -82,14 +83,16 @@ float float_at(const char* bytes) {
   return std::bit_cast<float>(bits);
 }
 
-void read_binary(const std::string& bytes, const std::string& name, const ModelLimits& limits, TriangleList& list) {
+void read_binary(const std::string& bytes, const std::string& name, const ModelLimits& limits,
+                 TriangleList& list) {
   const std::size_t count = count_of(bytes);
   const std::size_t there = (bytes.size() - kHeaderBytes - 4) / kTriangleBytes;
   if (count > there)
-    throw InputError(
-        name, "its header promises " + std::to_string(count) + " triangles, the file holds " + std::to_string(there));
+    throw InputError(name, "its header promises " + std::to_string(count) + " triangles, the file holds " +
+                               std::to_string(there));
   if (count > limits.triangles)
-    throw InputError(name, "the model has more triangles than the limit of " + std::to_string(limits.triangles));
+    throw InputError(name,
+                     "the model has more triangles than the limit of " + std::to_string(limits.triangles));
   for (std::size_t t = 0; t < count; ++t) {
     const char* corner = bytes.data() + kHeaderBytes + 4 + kTriangleBytes * t + kNormalBytes;
     TriangleList::Corners corners;
@@ -104,7 +107,8 @@ void read_binary(const std::string& bytes, const std::string& name, const ModelL
 /// Reads an ASCII file.
 class AsciiStlReader {
  public:
-  AsciiStlReader(std::string_view text, const std::string& name, const ModelLimits& limits, TriangleList& list)
+  AsciiStlReader(std::string_view text, const std::string& name, const ModelLimits& limits,
+                 TriangleList& list)
       : text_(text), name_(name), limits_(limits), list_(list) {}
 
   void read() {
@@ -129,8 +133,8 @@ class AsciiStlReader {
     } else if (key == "endloop") {
       end_triangle();
     } else if (!key.empty() && key != "solid" && key != "facet" && key != "endfacet" && key != "endsolid") {
-      fail("expected solid, facet, outer loop, vertex, endloop, endfacet or endsolid, found '" + key.substr(0, 40) +
-           "'");
+      fail("expected solid, facet, outer loop, vertex, endloop, endfacet or endsolid, found '" +
+           key.substr(0, 40) + "'");
     }
   }
 

@@ -44,7 +44,8 @@ FakeDaemon::FakeDaemon(std::function<void(Peer&)> script) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, socket_path().c_str(), sizeof(address.sun_path) - 1);
-  if (bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 || listen(listener_, 4) != 0)
+  if (bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
+      listen(listener_, 4) != 0)
     throw std::runtime_error("the fake daemon cannot listen");
   thread_ = std::thread([this, run = std::move(script)] {
     const int connection = accept(listener_, nullptr, nullptr);

@@ -66,8 +66,8 @@ struct CommandRun {
   int exit_code = -1;
   std::string out, err;
 };
-/// Runs `hilbrush` with these arguments; `input`: what the operator types, on a terminal; nothing: standard input is a
-/// pipe.
+/// Runs `hilbrush` with these arguments; `input`: what the operator types, on a terminal; nothing: standard
+/// input is a pipe.
 CommandRun run_command(const std::vector<std::string>& arguments, bool is_terminal = false,
                        const char* input = nullptr);
 
@@ -87,6 +87,7 @@ class ScriptedChild : public testing::Test {
   TemporaryFolder folder_;
 };
 /// For the script: the child's arguments go to $folder/arguments, one a line.
-inline constexpr const char* kKeepArguments = "for a in \"$@\"; do echo \"$a\"; done > \"$folder/arguments\"\n";
+inline constexpr const char* kKeepArguments =
+    "for a in \"$@\"; do echo \"$a\"; done > \"$folder/arguments\"\n";
 
 }  // namespace hilbrush::commands_test

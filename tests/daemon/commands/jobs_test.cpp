@@ -30,7 +30,8 @@ std::string job_in(const std::string& state) {
   return text.replace(text.find(now), now.size(), state);
 }
 
-CommandRun run_with(AnsweringDaemon& daemon, std::vector<std::string> arguments, const char* input = nullptr) {
+CommandRun run_with(AnsweringDaemon& daemon, std::vector<std::string> arguments,
+                    const char* input = nullptr) {
   arguments.insert(arguments.end(), {"--socket", daemon.socket_path()});
   return run_command(arguments, false, input);
 }
@@ -101,14 +102,15 @@ TEST(JobCommands, SubmitResolvesPathsAndSendsOnlyWhatWasGiven) {
   const std::filesystem::path before = std::filesystem::current_path();
   std::filesystem::current_path(folder.path());
   AnsweringDaemon daemon(kJob);
-  const CommandRun run = run_with(
-      daemon, {"submit", "cup.wrl", "--dry-run", "--key", "order-17", "--size-mm", "80", "--cell", "./c.json"});
+  const CommandRun run = run_with(daemon, {"submit", "cup.wrl", "--dry-run", "--key", "order-17", "--size-mm",
+                                           "80", "--cell", "./c.json"});
   std::filesystem::current_path(before);
   EXPECT_EQ(run.exit_code, kExitOk) << run.err;
   const std::string absolute = std::filesystem::canonical(folder.path()).string();
-  EXPECT_EQ(daemon.requests(), std::vector<std::string>{R"(job.submit {"model":")" + absolute +
-                                                        R"(/cup.wrl","settings":{"size_mm":80.0,"cell":")" + absolute +
-                                                        R"(/c.json"},"dry_run":true,"key":"order-17"})"});
+  EXPECT_EQ(daemon.requests(),
+            std::vector<std::string>{R"(job.submit {"model":")" + absolute +
+                                     R"(/cup.wrl","settings":{"size_mm":80.0,"cell":")" + absolute +
+                                     R"(/c.json"},"dry_run":true,"key":"order-17"})"});
   EXPECT_EQ(run.out, "job 7: painting, 500 of 2,000 dots exposed, 25 %, about 0:01:05 left\n");
 }
 
@@ -185,8 +187,10 @@ TEST(JobCommands, GetAndSubmitShowThePlan) {
             "job 7: queued\n`hilbrush watch 7 --until ready` shows what is planned and its warnings\n");
 }
 
-/// A daemon that answers the requests with these jobs, the last one again and again, and keeps what was asked.
-std::function<void(Peer&)> answering_in_turn(std::vector<std::string> states, std::vector<std::string>& methods) {
+/// A daemon that answers the requests with these jobs, the last one again and again, and keeps what was
+/// asked.
+std::function<void(Peer&)> answering_in_turn(std::vector<std::string> states,
+                                             std::vector<std::string>& methods) {
   return [states = std::move(states), &methods](Peer& peer) {
     for (std::string line = peer.read_line(); !line.empty(); line = peer.read_line()) {
       const Json request = Json::parse(line);
@@ -204,7 +208,8 @@ TEST(JobCommands, PauseAndCancelAnswerWithTheNewState) {
     const CommandRun run = run_command({command, "7", "--socket", daemon.socket_path()});
     daemon.finish();
     EXPECT_EQ(run.exit_code, kExitOk) << run.err;
-    EXPECT_TRUE(run.out.starts_with(std::string("job 7: ") + state + ", 500 of 2,000 dots exposed")) << run.out;
+    EXPECT_TRUE(run.out.starts_with(std::string("job 7: ") + state + ", 500 of 2,000 dots exposed"))
+        << run.out;
     EXPECT_EQ(methods, (std::vector<std::string>{std::string("job.") + command, "job.get", "job.get"}));
   }
 }
@@ -227,10 +232,10 @@ TEST(JobCommands, CancelOfAJobThatIsPaintedAsksOnATerminal) {
 }
 
 TEST(JobCommands, RefusalsBecomeExitCodes) {
-  const std::pair<int, int> codes[] = {{-32700, kExitInternal}, {-32600, kExitInternal}, {-32601, kExitInternal},
-                                       {-32602, kExitBadInput}, {-32000, kExitInternal}, {-32001, kExitBadInput},
-                                       {-32002, kExitRefused},  {-32003, kExitBadInput}, {-32004, kExitRefused},
-                                       {-32005, kExitRefused}};
+  const std::pair<int, int> codes[] = {
+      {-32700, kExitInternal}, {-32600, kExitInternal}, {-32601, kExitInternal}, {-32602, kExitBadInput},
+      {-32000, kExitInternal}, {-32001, kExitBadInput}, {-32002, kExitRefused},  {-32003, kExitBadInput},
+      {-32004, kExitRefused},  {-32005, kExitRefused}};
   for (const auto& [code, exit_code] : codes) {
     AnsweringDaemon daemon(R"("error":{"code":)" + std::to_string(code) +
                            R"(,"message":"a sentence","data":{"at":"$.id"}})");
@@ -244,9 +249,10 @@ TEST(CellCommands, StatusIsTextActsAreALine) {
   const std::string cell =
       R"("result":{"cell":{"state":"stopped","laser":"off","devices":{"robot":{"state":"ready","fault":null}},"joints":null,"job":null,"reason":"stopped by user 0"}})";
   AnsweringDaemon daemon(cell);
-  EXPECT_EQ(run_with(daemon, {"status"}).out,
-            "  cell:          stopped\n  reason:        stopped by user 0\n  laser:         off\n  devices:       "
-            "robot ready\n");
+  EXPECT_EQ(
+      run_with(daemon, {"status"}).out,
+      "  cell:          stopped\n  reason:        stopped by user 0\n  laser:         off\n  devices:       "
+      "robot ready\n");
   AnsweringDaemon stopped(cell);
   EXPECT_EQ(run_with(stopped, {"stop"}).out, "cell: stopped, laser off, stopped by user 0\n");
   AnsweringDaemon info(R"("result":{"system":{"version":"0.1.0","cell":{"name":"default"}}})");
@@ -255,10 +261,12 @@ TEST(CellCommands, StatusIsTextActsAreALine) {
 
 std::string job(const std::string& state, double progress, const std::string& more = {}) {
   return R"({"id":"7","state":")" + state + R"(","dots":{"placed":100,"exposed":)" +
-         std::to_string(static_cast<int>(100 * progress)) + R"(},"progress":)" + std::to_string(progress) + more + "}";
+         std::to_string(static_cast<int>(100 * progress)) + R"(},"progress":)" + std::to_string(progress) +
+         more + "}";
 }
 
-/// A daemon that answers job.watch with the first of these jobs and notifies of the others, then closes or waits.
+/// A daemon that answers job.watch with the first of these jobs and notifies of the others, then closes or
+/// waits.
 std::function<void(Peer&)> telling(std::vector<std::string> jobs, bool closes = false) {
   return [jobs = std::move(jobs), closes](Peer& peer) {
     peer.read_line();
@@ -278,10 +286,10 @@ CommandRun watch(const std::function<void(Peer&)>& script, std::vector<std::stri
 }
 
 TEST(Watch, APipeGetsLinesUntilTheJobIsDone) {
-  const CommandRun run = watch(
-      telling({job("queued", 0), job("planning", .5, R"(,"stage":"load")"), job("planning", .6, R"(,"stage":"load")"),
-               job("painting", 0), job("painting", .05), job("painting", .11, R"(,"eta_s":9)"), job("painting", .15),
-               job("done", 1, R"(,"output":"/jobs/7")")}));
+  const CommandRun run = watch(telling({job("queued", 0), job("planning", .5, R"(,"stage":"load")"),
+                                        job("planning", .6, R"(,"stage":"load")"), job("painting", 0),
+                                        job("painting", .05), job("painting", .11, R"(,"eta_s":9)"),
+                                        job("painting", .15), job("done", 1, R"(,"output":"/jobs/7")")}));
   EXPECT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(run.out,
             "job 7: queued, 0 of 100 dots exposed\n"
@@ -293,10 +301,11 @@ TEST(Watch, APipeGetsLinesUntilTheJobIsDone) {
 }
 
 TEST(Watch, ShowsThePlanAndItsWarningsOnceWhenItIsMade) {
-  const std::string planned = R"(,"warnings":["w"],"plan":{"size_mm":[1,2,3],"skipped":[],"suggestion":null})";
+  const std::string planned =
+      R"(,"warnings":["w"],"plan":{"size_mm":[1,2,3],"skipped":[],"suggestion":null})";
   const std::string early = R"(,"stage":"load","warnings":["w"],"plan":null)";
-  const CommandRun run = watch(telling(
-      {job("planning", .5, early), job("ready", 0, planned), job("painting", 0, planned), job("done", 1, planned)}));
+  const CommandRun run = watch(telling({job("planning", .5, early), job("ready", 0, planned),
+                                        job("painting", 0, planned), job("done", 1, planned)}));
   EXPECT_EQ(run.err, "warning: w\n");
   EXPECT_EQ(run.out,
             "job 7: planning, load\n"
@@ -323,19 +332,22 @@ TEST(Watch, JsonIsEveryUpdate) {
 }
 
 TEST(Watch, AFailedOrCancelledJobIsSix) {
-  const CommandRun failed =
-      watch(telling({job("painting", .5), job("failed", .5, R"(,"error":{"at":"laser","message":"interlock open"})")}));
+  const CommandRun failed = watch(telling(
+      {job("painting", .5), job("failed", .5, R"(,"error":{"at":"laser","message":"interlock open"})")}));
   EXPECT_EQ(failed.exit_code, kExitJobFailed);
   EXPECT_EQ(failed.err, "hilbrush: job 7: laser: interlock open\n");
   EXPECT_EQ(watch(telling({job("cancelled", 0)})).exit_code, kExitJobFailed);
 }
 
 TEST(Watch, UntilEndsAtTheStateOrPastIt) {
-  EXPECT_EQ(watch(telling({job("queued", 0), job("planning", 0), job("ready", 0)}), {"--until", "ready"}).exit_code,
-            kExitOk);
+  EXPECT_EQ(
+      watch(telling({job("queued", 0), job("planning", 0), job("ready", 0)}), {"--until", "ready"}).exit_code,
+      kExitOk);
   EXPECT_EQ(watch(telling({job("painting", 0)}), {"--until", "ready"}).exit_code, kExitOk);
-  EXPECT_EQ(watch(telling({job("painting", 0), job("paused", .5)}), {"--until", "paused"}).exit_code, kExitOk);
-  EXPECT_EQ(watch(telling({job("paused", .5), job("painting", .5)}), {"--until", "painting"}).exit_code, kExitOk);
+  EXPECT_EQ(watch(telling({job("painting", 0), job("paused", .5)}), {"--until", "paused"}).exit_code,
+            kExitOk);
+  EXPECT_EQ(watch(telling({job("paused", .5), job("painting", .5)}), {"--until", "painting"}).exit_code,
+            kExitOk);
   EXPECT_EQ(watch(telling({job("failed", 0)}), {"--until", "ready"}).exit_code, kExitJobFailed);
 }
 
@@ -364,7 +376,8 @@ TEST(Watch, UntilCanBeOnePartOfSeveral) {
 
 TEST(Watch, SaysWhyAJobIsPausedAndWhatItWaitsFor) {
   const std::string why = R"(,"error":{"at":"cell","message":"the cell was stopped: stopped by anna"})";
-  const std::string line = "job 7: paused, 50 of 100 dots exposed, 50 %: cell: the cell was stopped: stopped by anna\n";
+  const std::string line =
+      "job 7: paused, 50 of 100 dots exposed, 50 %: cell: the cell was stopped: stopped by anna\n";
   const std::string wait =
       "job 7 waits for `hilbrush resume 7`; the cell must be armed (`hilbrush clear`, `hilbrush arm`)\n";
   const auto script = telling({job("painting", .5), job("paused", .5, why), job("done", 1)});

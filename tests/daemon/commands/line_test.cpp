@@ -7,7 +7,8 @@
 #include "daemon/commands/exit_code.h"
 #include "tests/daemon/commands/command_runs.h"
 
-/// Parsing, help, exit codes and check-config: everything of the command that needs neither daemon nor pipeline.
+/// Parsing, help, exit codes and check-config: everything of the command that needs neither daemon nor
+/// pipeline.
 namespace hilbrush {
 namespace {
 
@@ -105,7 +106,8 @@ TEST(CommandLine, NegativeAndEndlessNumbersAreRefused) {
   }
   const CommandRun run = error({"--dots", "-4"});
   EXPECT_EQ(run.exit_code, kExitUsage);
-  EXPECT_NE(run.err.find("--dots: expected a whole number of at least 0, found -4"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("--dots: expected a whole number of at least 0, found -4"), std::string::npos)
+      << run.err;
   EXPECT_EQ(run_command({"move", "3", "0"}).exit_code, kExitUsage);
   EXPECT_LT(run_command({"move", "3", "0"}).err.size(), 120u);
 }
@@ -158,7 +160,8 @@ TEST(CheckConfig, ABadCellIsThreeAndNamesThePath) {
   const std::string file = folder.write("cell.json", R"({"name":"mine","axis":{}})");
   const CommandRun run = run_command({"check-config", file});
   EXPECT_EQ(run.exit_code, kExitBadInput);
-  EXPECT_EQ(run.err, "hilbrush: " + file + ": $.axes: missing: expected an object, found the key \"axis\" instead\n");
+  EXPECT_EQ(run.err,
+            "hilbrush: " + file + ": $.axes: missing: expected an object, found the key \"axis\" instead\n");
   EXPECT_EQ(run_command({"check-config", "/none.json"}).exit_code, kExitBadInput);
   EXPECT_EQ(run_command({"check-config", "--cell", "none"}).exit_code, kExitBadInput);
   const CommandRun unknown = run_command({"check-config", "none"});
@@ -168,7 +171,8 @@ TEST(CheckConfig, ABadCellIsThreeAndNamesThePath) {
 
 TEST(CheckConfig, JobSettingsCanBeCheckedToo) {
   const TemporaryFolder folder;
-  EXPECT_EQ(run_command({"check-config", "--settings", folder.write("job.json", R"({"dpi":300})")}).exit_code, kExitOk);
+  EXPECT_EQ(run_command({"check-config", "--settings", folder.write("job.json", R"({"dpi":300})")}).exit_code,
+            kExitOk);
   const std::string bad = folder.write("bad.json", R"({"dip":300})");
   const CommandRun run = run_command({"check-config", "--settings", bad});
   EXPECT_EQ(run.exit_code, kExitBadInput);

@@ -49,12 +49,14 @@ TEST(TextOutput, ReportSaysWhatAPersonNeeds) {
       "  size:          48.14 x 48.20 x 60.00 mm\n"
       "  place:         x -24.07 to 24.07, y -24.10 to 24.10, z 0.00 to 60.00 mm from the top of the post\n"
       "  repaired:      3 vertices welded, 1,200 degenerate triangles dropped\n"
-      "  dots:          1,000 placed, 990 exposed (99.00 %), 7 skipped (4 occluded, 3 joint limit), 2 remaining, 1 in "
+      "  dots:          1,000 placed, 990 exposed (99.00 %), 7 skipped (4 occluded, 3 joint limit), 2 "
+      "remaining, 1 in "
       "doubt\n"
       "  pitch:         0.254 mm\n"
       "  incidence:     mean 10.0, 95 % below 22.0, at most 44.9 degrees\n"
       "  painting time: 1:01:00 (move 0:50:00, settle 0:10:00, expose 0:01:00, retract 0:00:00)\n"
-      "  fidelity:      F1 26.0 dB, F2 37.0 dB, S2 0.950, tone rms 0.0041; 0.12 % of the surface is out of reach\n"
+      "  fidelity:      F1 26.0 dB, F2 37.0 dB, S2 0.950, tone rms 0.0041; 0.12 % of the surface is out of "
+      "reach\n"
       "  computed in:   7.2 s, 412 MB\n"
       "  warning:       texture a.png is missing\n");
 }
@@ -66,7 +68,8 @@ TEST(TextOutput, SkippedDotsHaveAmountsAndASuggestion) {
                                       {"reason":"occluded","count":4,"text":"beam blocked"}])");
   report["suggestion"] = Json::parse(R"({"text":"a post of 90 mm would reach more"})");
   const std::string text = format_report(report);
-  EXPECT_NE(text.find("  skipped:       1,234 x tilt past its limit, typically by 2.1\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  skipped:       1,234 x tilt past its limit, typically by 2.1\n"), std::string::npos)
+      << text;
   EXPECT_NE(text.find("  skipped:       4 x beam blocked\n"), std::string::npos) << text;
   EXPECT_NE(text.find("  suggestion:    a post of 90 mm would reach more\n"), std::string::npos) << text;
   report["suggestion"] = nullptr;
@@ -82,10 +85,14 @@ TEST(TextOutput, SharesAreNeverRoundedUpToAll) {
 
 TEST(TextOutput, JobLineDependsOnTheState) {
   const auto line = [](const char* json) { return format_job_line(Json::parse(json)); };
-  EXPECT_EQ(line(R"({"id":"7","state":"queued","dots":{"placed":0},"progress":0.0,"eta_s":null})"), "job 7: queued");
-  EXPECT_EQ(line(R"({"id":"7","state":"planning","stage":"disk","progress":0.425})"), "job 7: planning, disk 42 %");
-  EXPECT_EQ(line(R"({"id":"7","state":"painting","dots":{"placed":2000,"exposed":500},"progress":0.25,"eta_s":65})"),
-            "job 7: painting, 500 of 2,000 dots exposed, 25 %, about 0:01:05 left");
+  EXPECT_EQ(line(R"({"id":"7","state":"queued","dots":{"placed":0},"progress":0.0,"eta_s":null})"),
+            "job 7: queued");
+  EXPECT_EQ(line(R"({"id":"7","state":"planning","stage":"disk","progress":0.425})"),
+            "job 7: planning, disk 42 %");
+  EXPECT_EQ(
+      line(
+          R"({"id":"7","state":"painting","dots":{"placed":2000,"exposed":500},"progress":0.25,"eta_s":65})"),
+      "job 7: painting, 500 of 2,000 dots exposed, 25 %, about 0:01:05 left");
   EXPECT_EQ(line(R"({"id":7,"state":"done","dots":{"placed":2000,"exposed":1999},"progress":1})"),
             "job 7: done, 1,999 of 2,000 dots exposed");
   EXPECT_EQ(line("{}"), "job ?: ?");
@@ -146,7 +153,8 @@ TEST(TextOutput, NoTextCanSteerTheTerminal) {
       "31m\x7f";
   const std::string text =
       format_report(report) + format_job(Json{{"id", "\033]0;x\a"}, {"model", "a\nb"}, {"k\033[1m", "v"}});
-  for (const char c : text) EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << static_cast<int>(c);
+  for (const char c : text)
+    EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << static_cast<int>(c);
   EXPECT_EQ(text.find("\xc2\x9b"), std::string::npos);
   EXPECT_EQ(printable("Gr\xc3\xbc\xc3\x9f"
                       "e"),
@@ -156,7 +164,8 @@ TEST(TextOutput, NoTextCanSteerTheTerminal) {
 
 /// Replaces values at random places by others of any type.
 void mutate(Json& json, std::mt19937& random) {
-  const Json values[] = {nullptr, true, -1, 1e300, "text", Json::array({1, "x", nullptr}), Json::object({{"a", 1}})};
+  const Json values[] = {
+      nullptr, true, -1, 1e300, "text", Json::array({1, "x", nullptr}), Json::object({{"a", 1}})};
   if (json.is_structured() && !json.empty() && random() % 4 != 0) {
     auto member = json.begin();
     std::advance(member, random() % json.size());

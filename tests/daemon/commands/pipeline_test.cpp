@@ -48,7 +48,8 @@ constexpr const char* kResult =
 
 TEST_F(PipelineCommands, DryRunShowsStagesWarningsReportAndFiles) {
   use_child(
-      std::string(R"(echo '{"stage":"load","fraction":0.5}'; echo 'of a library'; echo '{"stage":"load","fraction":1}'
+      std::string(
+          R"(echo '{"stage":"load","fraction":0.5}'; echo 'of a library'; echo '{"stage":"load","fraction":1}'
 echo '{"warning":"texture a.png is missing"}'; echo '{"stage":"plan","fraction":0.25}'
 mkdir -p "$folder/out/views"; echo '{}' > "$folder/out/report.json"; echo > "$folder/out/exposure.png"
 )") + kResult);
@@ -71,7 +72,9 @@ mkdir -p "$folder/out/views"; echo '{}' > "$folder/out/report.json"; echo > "$fo
 }
 
 TEST_F(PipelineCommands, ARunThatCanExposeNoDotIsSix) {
-  const auto result_of = [](const std::string& dots) { return "echo '{\"result\":{\"dots\":" + dots + "}}'"; };
+  const auto result_of = [](const std::string& dots) {
+    return "echo '{\"result\":{\"dots\":" + dots + "}}'";
+  };
   for (const char* json : {"", "--json"}) {
     std::vector<std::string> arguments{"plan", model_, "-o", path("out")};
     if (*json != '\0') arguments.emplace_back(json);
@@ -91,7 +94,8 @@ TEST_F(PipelineCommands, ATerminalGetsABarWithTheStage) {
 }
 
 TEST_F(PipelineCommands, JsonIsTheResultAndNothingElse) {
-  use_child(std::string("echo '{\"stage\":\"load\",\"fraction\":0.5}'\n") + R"(echo '{"result":{"b":1,"a":[2]}}')");
+  use_child(std::string("echo '{\"stage\":\"load\",\"fraction\":0.5}'\n") +
+            R"(echo '{"result":{"b":1,"a":[2]}}')");
   const CommandRun run = run_command({"plan", model_, "-o", path("out"), "--json"});
   EXPECT_EQ(run.exit_code, kExitOk);
   EXPECT_EQ(run.out, "{\"b\":1,\"a\":[2]}\n");
@@ -100,12 +104,34 @@ TEST_F(PipelineCommands, JsonIsTheResultAndNothingElse) {
 
 TEST_F(PipelineCommands, TheChildGetsAbsolutePathsAndCanonicalSettings) {
   use_child(std::string(kKeepArguments) + kResult);
-  const std::string settings = folder_.write("job.json", R"({"dpi":300,"units_mm":1,"seed":4,"sampler":"even"})");
-  const CommandRun run = run_command(
-      {"plan",    model_,          "-o",        path("a/../out"), "--settings", settings, "--dots",
-       "5000",    "--size-mm",     "80",        "--sampler",      "jittered",   "--up",   "z",
-       "--curve", "peano2",        "--density", "mean_curvature", "--levels",   "3",      "--predictive-rounds",
-       "2",       "--fine-passes", "7",         "--tone-curve",   "linear"});
+  const std::string settings =
+      folder_.write("job.json", R"({"dpi":300,"units_mm":1,"seed":4,"sampler":"even"})");
+  const CommandRun run = run_command({"plan",
+                                      model_,
+                                      "-o",
+                                      path("a/../out"),
+                                      "--settings",
+                                      settings,
+                                      "--dots",
+                                      "5000",
+                                      "--size-mm",
+                                      "80",
+                                      "--sampler",
+                                      "jittered",
+                                      "--up",
+                                      "z",
+                                      "--curve",
+                                      "peano2",
+                                      "--density",
+                                      "mean_curvature",
+                                      "--levels",
+                                      "3",
+                                      "--predictive-rounds",
+                                      "2",
+                                      "--fine-passes",
+                                      "7",
+                                      "--tone-curve",
+                                      "linear"});
   ASSERT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(child_arguments()[0], "plan");
   EXPECT_EQ(child_argument("--model"), model_);
@@ -131,8 +157,8 @@ TEST_F(PipelineCommands, DevelopTakesTheSettingsBesideTheProgram) {
   folder_.write("program.ply", "ply");
   folder_.write("emissions.ply", "ply");
   folder_.write("report.json", R"({"settings":{"dpi":200,"size_mm":60},"dots":{}})");
-  const CommandRun run = run_command(
-      {"develop", model_, "-o", path("out"), "--program", path("program.ply"), "--emissions", path("emissions.ply")});
+  const CommandRun run = run_command({"develop", model_, "-o", path("out"), "--program", path("program.ply"),
+                                      "--emissions", path("emissions.ply")});
   ASSERT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(child_argument("--program"), path("program.ply"));
   EXPECT_EQ(child_argument("--emissions"), path("emissions.ply"));
@@ -141,7 +167,8 @@ TEST_F(PipelineCommands, DevelopTakesTheSettingsBesideTheProgram) {
 }
 
 TEST_F(PipelineCommands, CalibrateNeedsNoModelAndPrintsTheCurve) {
-  use_child(std::string(kKeepArguments) + R"(echo '{"result":{"sampler":"even","wanted":[0,1],"asked":[0,1.625]}}')");
+  use_child(std::string(kKeepArguments) +
+            R"(echo '{"result":{"sampler":"even","wanted":[0,1],"asked":[0,1.625]}}')");
   const CommandRun run = run_command({"calibrate", "-o", path("out"), "--sampler", "even"});
   ASSERT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(child_argument("--model"), "(none)");
@@ -155,8 +182,10 @@ TEST_F(PipelineCommands, CalibrateTakesReadingsOrWritesAWedge) {
   EXPECT_EQ(child_argument("--measured"), readings);
   ASSERT_EQ(run_command({"calibrate", "-o", path("out"), "--wedge"}).exit_code, kExitOk);
   EXPECT_EQ(child_arguments().back(), "--wedge");
-  EXPECT_EQ(run_command({"calibrate", "-o", path("out"), "--wedge", "--measured", readings}).exit_code, kExitUsage);
-  EXPECT_EQ(run_command({"calibrate", "-o", path("out"), "--measured", path("none.json")}).exit_code, kExitBadInput);
+  EXPECT_EQ(run_command({"calibrate", "-o", path("out"), "--wedge", "--measured", readings}).exit_code,
+            kExitUsage);
+  EXPECT_EQ(run_command({"calibrate", "-o", path("out"), "--measured", path("none.json")}).exit_code,
+            kExitBadInput);
 }
 
 TEST_F(PipelineCommands, BadInputIsRefusedBeforeTheChildStarts) {
@@ -170,7 +199,8 @@ TEST_F(PipelineCommands, BadInputIsRefusedBeforeTheChildStarts) {
   EXPECT_EQ(error({"plan", path("none.wrl")}), "hilbrush: " + path("none.wrl") + ": no such model\n");
   EXPECT_EQ(error({"plan", folder_.path().string()}),
             "hilbrush: " + folder_.path().string() + ": is a folder, not a model\n");
-  EXPECT_EQ(error({"plan", model_, "--dpi", "5"}), "hilbrush: --dpi: expected a number from 10 to 1200, found 5\n");
+  EXPECT_EQ(error({"plan", model_, "--dpi", "5"}),
+            "hilbrush: --dpi: expected a number from 10 to 1200, found 5\n");
   EXPECT_EQ(error({"plan", model_, "--size-mm", "8", "--units-mm", "1"}),
             "hilbrush: --units-mm: contradicts size_mm: give size_mm or units_mm, not both\n");
   EXPECT_EQ(error({"plan", model_, "--levels", "5"}),
@@ -181,13 +211,15 @@ TEST_F(PipelineCommands, BadInputIsRefusedBeforeTheChildStarts) {
   EXPECT_EQ(error({"plan", model_, "--settings", settings}),
             "hilbrush: " + settings + ": $.dpi: expected a number from 10 to 1200, found 5\n");
   const std::string empty = folder_.write("empty.json", "");
-  EXPECT_TRUE(error({"plan", model_, "--settings", empty}).starts_with("hilbrush: " + empty + ":1: not JSON"));
+  EXPECT_TRUE(
+      error({"plan", model_, "--settings", empty}).starts_with("hilbrush: " + empty + ":1: not JSON"));
   EXPECT_NE(error({"plan", model_, "--cell", "none"}).find("no cell is called \"none\""), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path("arguments")));
 }
 
 TEST_F(PipelineCommands, TheChildsErrorsKeepPlaceSentenceAndExitCode) {
-  use_child(R"(echo 'a library says so' >&2; echo '{"error":{"at":"cup.wrl:12","message":"no geometry"}}'; exit 3)");
+  use_child(
+      R"(echo 'a library says so' >&2; echo '{"error":{"at":"cup.wrl:12","message":"no geometry"}}'; exit 3)");
   const CommandRun run = run_command({"dry-run", model_, "-o", path("out"), "--json"});
   EXPECT_EQ(run.exit_code, kExitBadInput);
   EXPECT_EQ(run.err, "hilbrush: cup.wrl:12: no geometry\n  | a library says so\n");
@@ -200,9 +232,11 @@ TEST_F(PipelineCommands, AChildThatDiesIsReportedInASentence) {
   };
   const Case cases[] = {
       {"kill -9 $$", "hilbrush-pipeline was killed (signal 9, Killed), probably because memory ran out"},
-      {"kill -11 $$", "hilbrush-pipeline crashed (signal 11, Segmentation fault); this is a fault of the program"},
+      {"kill -11 $$",
+       "hilbrush-pipeline crashed (signal 11, Segmentation fault); this is a fault of the program"},
       {"kill -15 $$", "hilbrush-pipeline was ended from outside (signal 15, Terminated)"},
-      {"kill -25 $$", "hilbrush-pipeline was ended by a resource limit of this session (signal 25, File size limit"},
+      {"kill -25 $$",
+       "hilbrush-pipeline was ended by a resource limit of this session (signal 25, File size limit"},
       {"exit 1", "hilbrush-pipeline ended with code 1 and without a result"},
       {"exit 0", "hilbrush-pipeline ended with code 0 and without a result"},
       {"echo '{\"result\":{}}'; exit 1", "hilbrush-pipeline ended with code 1 after its result"},
@@ -235,9 +269,11 @@ i=0; while [ $i -lt 3000 ]; do echo "noise noise noise noise noise noise" >&2; i
 }
 
 TEST_F(PipelineCommands, TheChildHasNoStandardInputAndItsOwnProcessGroup) {
-  use_child(std::string("cat; [ \"$(ps -o pgid= -p $$ 2>/dev/null || cut -d' ' -f5 /proc/$$/stat)\" -eq $$ ] && touch "
-                        "\"$folder/own\"\n") +
-            kResult);
+  use_child(
+      std::string(
+          "cat; [ \"$(ps -o pgid= -p $$ 2>/dev/null || cut -d' ' -f5 /proc/$$/stat)\" -eq $$ ] && touch "
+          "\"$folder/own\"\n") +
+      kResult);
   EXPECT_EQ(run_command({"dry-run", model_, "-o", path("out")}).exit_code, kExitOk);
   EXPECT_TRUE(std::filesystem::exists(path("own")));
 }

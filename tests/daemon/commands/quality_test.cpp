@@ -20,7 +20,9 @@ using Json = nlohmann::ordered_json;
 class QualityCommand : public commands_test::ScriptedChild {
  protected:
   /// A script that also keeps its arguments.
-  void use_child(const std::string& script) { ScriptedChild::use_child(commands_test::kKeepArguments + script); }
+  void use_child(const std::string& script) {
+    ScriptedChild::use_child(commands_test::kKeepArguments + script);
+  }
   bool child_ran() const { return std::filesystem::exists(path("arguments")); }
 
   /// What the child was asked.
@@ -36,8 +38,9 @@ constexpr const char* kEmptyResult = R"(echo '{"result":{"sizes":[]}}')";
 
 TEST_F(QualityCommand, ANamedSetGoesToTheChildAsItIs) {
   use_child(kEmptyResult);
-  const CommandRun run = run_command({"quality", "plane", "-o", path("a/../out"), "--sampler", "jittered", "--curve",
-                                      "peano2", "--density", "u+v", "--count", "100,200,400", "--seed", "7"});
+  const CommandRun run =
+      run_command({"quality", "plane", "-o", path("a/../out"), "--sampler", "jittered", "--curve", "peano2",
+                   "--density", "u+v", "--count", "100,200,400", "--seed", "7"});
   ASSERT_EQ(run.exit_code, kExitOk) << run.err;
   EXPECT_EQ(request(), Json::parse(R"({"set":"plane","sampler":"jittered","curve":"peano2","density":"u+v",
                                        "count":[100,200,400],"seed":7})"));
@@ -57,8 +60,8 @@ TEST_F(QualityCommand, DotsTakeTheSettingsBesideThem) {
   const std::string dots = folder_.write("dots.ply", "ply\n");
   CommandRun run = run_command({"quality", dots, "--model", model, "-o", path("out")});
   EXPECT_EQ(run.exit_code, kExitBadInput);
-  EXPECT_EQ(run.err,
-            "hilbrush: " + dots + ": has no report.json beside it with the settings of its job: give --settings\n");
+  EXPECT_EQ(run.err, "hilbrush: " + dots +
+                         ": has no report.json beside it with the settings of its job: give --settings\n");
   EXPECT_FALSE(child_ran());
 
   folder_.write("report.json", R"({"settings":{"size_mm":60},"dots":{}})");
@@ -67,8 +70,9 @@ TEST_F(QualityCommand, DotsTakeTheSettingsBesideThem) {
   EXPECT_EQ(request(), (Json{{"set", dots}, {"model", model}, {"settings", R"({"size_mm":60})"}}));
 
   const std::string settings = folder_.write("job.json", R"({"size_mm":80})");
-  ASSERT_EQ(run_command({"quality", dots, "--model", model, "-o", path("out"), "--settings", settings}).exit_code,
-            kExitOk);
+  ASSERT_EQ(
+      run_command({"quality", dots, "--model", model, "-o", path("out"), "--settings", settings}).exit_code,
+      kExitOk);
   EXPECT_EQ(request()["settings"], R"({"size_mm":80})");
 
   folder_.write("report.json", "{}");
@@ -94,7 +98,8 @@ TEST_F(QualityCommand, PathsInErrorsOfTheChildBecomeFlags) {
   CommandRun run = run_command({"quality", "sphere", "-o", path("out"), "--area", "x"});
   EXPECT_EQ(run.exit_code, kExitBadInput);
   EXPECT_EQ(run.err, "hilbrush: --area: expected \"triangle\", found \"x\"\n");
-  use_child(R"(echo '{"error":{"at":"$.count[1]","message":"expected a number from 1 to 9, found 0"}}'; exit 3)");
+  use_child(
+      R"(echo '{"error":{"at":"$.count[1]","message":"expected a number from 1 to 9, found 0"}}'; exit 3)");
   run = run_command({"quality", "sphere", "-o", path("out"), "--count", "5", "--count", "0"});
   EXPECT_EQ(run.err, "hilbrush: --count: expected a number from 1 to 9, found 0\n");
   use_child(R"(echo '{"error":{"at":"$.set","message":"there is no file \"spere\""}}'; exit 3)");
@@ -142,8 +147,8 @@ TEST_F(QualityCommand, AStrangeResultIsNoFailure) {
 TEST_F(QualityCommand, HelpNamesTheSetsAndFlags) {
   const CommandRun run = run_command({"quality", "--help"});
   EXPECT_EQ(run.exit_code, kExitOk);
-  for (const char* word : {"monkey_saddle", "dots.ply", "--model", "--sampler", "--curve", "--area", "--density",
-                           "--points", "--count", "--seed", "--shapes", "--json"})
+  for (const char* word : {"monkey_saddle", "dots.ply", "--model", "--sampler", "--curve", "--area",
+                           "--density", "--points", "--count", "--seed", "--shapes", "--json"})
     EXPECT_NE(run.out.find(word), std::string::npos) << word;
 }
 

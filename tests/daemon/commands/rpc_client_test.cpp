@@ -16,7 +16,8 @@ using Json = nlohmann::ordered_json;
 using Milliseconds = RpcClient::Milliseconds;
 
 /// What connection error a call of "m" ends with, against this script; empty: none.
-std::string connection_error(const std::function<void(Peer&)>& script, Milliseconds timeout = Milliseconds(5000)) {
+std::string connection_error(const std::function<void(Peer&)>& script,
+                             Milliseconds timeout = Milliseconds(5000)) {
   FakeDaemon daemon(script);
   try {
     RpcClient client(daemon.socket_path(), timeout);
@@ -153,8 +154,10 @@ TEST(RpcClient, AnswersThatAreNoJsonRpcAreRefused) {
   };
   for (const char* line :
        {"HTTP/1.1 400 Bad Request", "[]", "{}", "", "{\"jsonrpc\":\"1.0\",\"id\":1,\"result\":1}", "\xff"})
-    EXPECT_NE(answer(line).find("does not speak JSON-RPC 2.0"), std::string::npos) << line << ": " << answer(line);
-  EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":2,"result":1})"), "the daemon answered a request that was not made");
+    EXPECT_NE(answer(line).find("does not speak JSON-RPC 2.0"), std::string::npos)
+        << line << ": " << answer(line);
+  EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":2,"result":1})"),
+            "the daemon answered a request that was not made");
   EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":1})"), "the daemon's answer has neither result nor error");
   EXPECT_EQ(answer(R"({"jsonrpc":"2.0","id":1,"error":"bad"})"),
             "the daemon answered with an error that is not a JSON-RPC error");

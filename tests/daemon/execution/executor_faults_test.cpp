@@ -32,8 +32,8 @@ Fault fault_at(Place place, Kind kind, int call) {
   return fault;
 }
 
-/// Runs the program on a cell with one fault, then on one without; whatever the first run came to, the witness must
-/// agree with the journal, and the rest must be painted. False if the fault never struck.
+/// Runs the program on a cell with one fault, then on one without; whatever the first run came to, the
+/// witness must agree with the journal, and the rest must be painted. False if the fault never struck.
 bool survives(Place place, Kind kind, int call, const ExposureProgram& program) {
   WitnessedCell world;
   const std::size_t count = program.exposures.size();
@@ -99,8 +99,8 @@ TEST(ExecutorFaultsTest, ALateAcknowledgementOfAPulseLeavesItsDotInDoubt) {
   Journal journal = Journal::in_memory(20);
   Fault fault = fault_at(Place::kFire, Kind::kThrowsLate, 8);
   FaultyLaser laser(world.cell().laser, fault);
-  const auto result =
-      world.paint_through({world.cell().robot, world.cell().table, laser, world.cell().clock}, program, journal);
+  const auto result = world.paint_through({world.cell().robot, world.cell().table, laser, world.cell().clock},
+                                          program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
   EXPECT_EQ(journal.in_doubt(), std::vector<std::size_t>{7});
   EXPECT_EQ(journal.done_count(), 7u);
@@ -112,8 +112,8 @@ TEST(ExecutorFaultsTest, AStaleInPositionIsNotBelieved) {
   Journal journal = Journal::in_memory(40);
   Fault fault = fault_at(Place::kRobotMove, Kind::kStalePosition, 10);
   FaultyAxes<4> robot(world.cell().robot, fault);
-  const auto result =
-      world.paint_through({robot, world.cell().table, world.cell().laser, world.cell().clock}, program, journal);
+  const auto result = world.paint_through({robot, world.cell().table, world.cell().laser, world.cell().clock},
+                                          program, journal);
   EXPECT_TRUE(fault.has_struck);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   expect_painted_once(program, journal, world.emissions());
@@ -128,18 +128,20 @@ TEST_P(AnAxisThatStandsElsewhere, IsAFaultAndSaysSo) {
   Journal journal = Journal::in_memory(40);
   Fault fault = fault_at(Place::kTableStatus, Kind::kElsewhere, GetParam());
   FaultyAxes<2> table(world.cell().table, fault);
-  const auto result =
-      world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
+  const auto result = world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock},
+                                          program, journal);
   EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
-  const bool is_reported = result.reason.find("the table says that it is in position but stands elsewhere") == 0 ||
-                       result.reason.find("the table left its position") == 0;
+  const bool is_reported =
+      result.reason.find("the table says that it is in position but stands elsewhere") == 0 ||
+      result.reason.find("the table left its position") == 0;
   EXPECT_TRUE(is_reported) << result.reason;
   expect_painted_once(program, journal, world.emissions());
 }
 
 INSTANTIATE_TEST_SUITE_P(Calls, AnAxisThatStandsElsewhere, ::testing::Range(20, 32));
 
-/// A robot that takes way-points ahead, made of one that does not: the next move begins when the one before has ended.
+/// A robot that takes way-points ahead, made of one that does not: the next move begins when the one before
+/// has ended.
 class BufferingRobot final : public Robot {
  public:
   BufferingRobot(Robot& robot, std::size_t look_ahead) : robot_(robot), look_ahead_(look_ahead) {}
@@ -217,8 +219,8 @@ TEST(ExecutorTest, HandsWayPointsAheadWhereOneChainMovesAlone) {
     WitnessedCell world;
     Journal journal = Journal::in_memory(100);
     BufferingRobot robot(world.cell().robot, look_ahead);
-    const auto result =
-        world.paint_through({robot, world.cell().table, world.cell().laser, world.cell().clock}, program, journal);
+    const auto result = world.paint_through(
+        {robot, world.cell().table, world.cell().laser, world.cell().clock}, program, journal);
     ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
     EXPECT_EQ(robot.most_waiting, look_ahead);
     EXPECT_GT(robot.prepared, 80u);
@@ -265,8 +267,8 @@ TEST(ExecutorTest, TellsTheTableItsNextTargetAlthoughTheArmMovesAloneFirst) {
   WitnessedCell world;
   Journal journal = Journal::in_memory(60);
   NotingTable table(world.cell().table);
-  const auto result =
-      world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
+  const auto result = world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock},
+                                          program, journal);
   ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   EXPECT_EQ(table.followed, table.prepared);
   EXPECT_GE(table.followed, 5u);
@@ -305,8 +307,8 @@ TEST(ExecutorTest, TellsTheLaserItsNextPowerWhileTheAxesMove) {
   WitnessedCell world;
   Journal journal = Journal::in_memory(40);
   NotingLaser laser(world.cell().laser);
-  const auto result =
-      world.paint_through({world.cell().robot, world.cell().table, laser, world.cell().clock}, program, journal);
+  const auto result = world.paint_through({world.cell().robot, world.cell().table, laser, world.cell().clock},
+                                          program, journal);
   ASSERT_EQ(result.outcome, ExecutionOutcome::kFinished) << result.reason;
   expect_painted_once(program, journal, world.emissions());
 }
@@ -349,8 +351,8 @@ TEST(ExecutorTest, APulseIsNotBelievedByWhatWasKnownBeforeIt) {
     WitnessedCell world;
     Journal journal = Journal::in_memory(10);
     UnheardTable table(world.cell(), unheard_s);
-    const auto result =
-        world.paint_through({world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
+    const auto result = world.paint_through(
+        {world.cell().robot, table, world.cell().laser, world.cell().clock}, program, journal);
     EXPECT_EQ(result.outcome, ExecutionOutcome::kFailed);
     EXPECT_EQ(result.reason, unheard_s < 1 ? "the table left its position during a pulse"
                                            : "the table has sent no status for too long");

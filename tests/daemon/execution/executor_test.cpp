@@ -60,12 +60,14 @@ TEST(ExecutorTest, PauseEndsBetweenTwoDotsAndTheRestFollows) {
   WitnessedCell world;
   const auto program = small_program(500);
   Journal journal = Journal::in_memory(500);
-  const auto paused = world.paint(program, journal, [&](std::size_t done) { world.control.pause = done == 123; });
+  const auto paused =
+      world.paint(program, journal, [&](std::size_t done) { world.control.pause = done == 123; });
   EXPECT_EQ(paused.outcome, ExecutionOutcome::kPaused);
   EXPECT_EQ(paused.exposed, 123u);
   EXPECT_TRUE(journal.in_doubt().empty());
   world.control.pause = false;
-  const auto rest = execute(program, {world.sim().joints()}, world.cell(), world.description, journal, world.control);
+  const auto rest =
+      execute(program, {world.sim().joints()}, world.cell(), world.description, journal, world.control);
   EXPECT_EQ(rest.outcome, ExecutionOutcome::kFinished) << rest.reason;
   EXPECT_EQ(rest.exposed, 377u);
   expect_painted_once(program, journal, world.emissions());
@@ -193,8 +195,9 @@ TEST(ExecutorTest, RefusesWhatIsOutsideTheLimits) {
   });
   expect_refused("power", [](ExposureProgram& program) { program.exposures[10].power_w = 5; });
   expect_refused("pulse", [](ExposureProgram& program) { program.exposures[10].pulse_s = 1; });
-  expect_refused("no pulse",
-                 [nan](ExposureProgram& program) { program.exposures[10].pulse_s = static_cast<float>(nan); });
+  expect_refused("no pulse", [nan](ExposureProgram& program) {
+    program.exposures[10].pulse_s = static_cast<float>(nan);
+  });
 }
 
 TEST(ExecutorTest, AFaultReportedByADeviceIsToldInItsWords) {

@@ -48,10 +48,10 @@ enum class Kind {
   kStop,            ///< the operator stops the cell, on this very thread, at this moment
   kClockJumps       ///< the clock leaps forward by an hour
 };
-inline constexpr Kind kKinds[] = {Kind::kThrows,    Kind::kThrowsLate,     Kind::kThrowsMemory,  Kind::kThrowsOddly,
-                                  Kind::kFault,     Kind::kLostLink,       Kind::kStalePosition, Kind::kNeverArrives,
-                                  Kind::kElsewhere, Kind::kOffUnconfirmed, Kind::kStaysOn,       Kind::kInterlockOpens,
-                                  Kind::kStop,      Kind::kClockJumps};
+inline constexpr Kind kKinds[] = {
+    Kind::kThrows,   Kind::kThrowsLate,     Kind::kThrowsMemory, Kind::kThrowsOddly, Kind::kFault,
+    Kind::kLostLink, Kind::kStalePosition,  Kind::kNeverArrives, Kind::kElsewhere,   Kind::kOffUnconfirmed,
+    Kind::kStaysOn,  Kind::kInterlockOpens, Kind::kStop,         Kind::kClockJumps};
 
 /// One fault at the n-th call of one place, counted from one.
 struct Fault {
@@ -89,7 +89,8 @@ struct Fault {
     return true;
   }
   void strike_late(bool is_struck) const {
-    if (is_struck && kind == Kind::kThrowsLate) throw DriverError("the device's acknowledgement did not come");
+    if (is_struck && kind == Kind::kThrowsLate)
+      throw DriverError("the device's acknowledgement did not come");
   }
 };
 
@@ -200,11 +201,13 @@ class FaultyLaser final : public Laser {
   Kind mood_ = Kind::kThrows;
 };
 
-/// Runs ahead of the cell's clock by what the fault adds. Times that come from the devices are behind by as much, as
-/// they are after a process was stopped for an hour.
+/// Runs ahead of the cell's clock by what the fault adds. Times that come from the devices are behind by as
+/// much, as they are after a process was stopped for an hour.
 class JumpingClock final : public Clock {
  public:
-  JumpingClock(Clock& clock, Fault& fault) : clock_(clock), fault_(fault) { fault_.clock_offset_s = &offset_s_; }
+  JumpingClock(Clock& clock, Fault& fault) : clock_(clock), fault_(fault) {
+    fault_.clock_offset_s = &offset_s_;
+  }
   double now_s() const override { return clock_.now_s() + offset_s_; }
   void sleep_until(double time_s) override {
     fault_.strikes(Place::kSleep);

@@ -119,7 +119,8 @@ TEST(JournalTest, NothingThatWasExposedIsEverRemainingOnTheDiskOfAPowerCut) {
   journal.done(Journal::kWindow);
   paint(journal, Journal::kWindow + 1, 2 * Journal::kWindow);
   const Journal reopened = Journal::open(at_last_sync, kProgram, "another boot");
-  for (std::size_t i = 0; i < 2 * Journal::kWindow; ++i) ASSERT_NE(reopened.state(i), ExposureState::kRemaining) << i;
+  for (std::size_t i = 0; i < 2 * Journal::kWindow; ++i)
+    ASSERT_NE(reopened.state(i), ExposureState::kRemaining) << i;
   EXPECT_EQ(reopened.in_doubt().size(), Journal::kWindow);
 }
 

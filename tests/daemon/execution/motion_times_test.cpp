@@ -17,7 +17,8 @@ CellDescription plain_cell() {
 }
 
 /// Moves of one axis each, the n-th by a length of its own.
-MotionTimes moves(const CellDescription& cell, int count, double delay_s, double factor_of_j2, unsigned seed) {
+MotionTimes moves(const CellDescription& cell, int count, double delay_s, double factor_of_j2,
+                  unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> length(.001, .5);
   MotionTimes times;

@@ -15,8 +15,8 @@
 #include "sim/devices/sim_cell.h"
 #include "tests/daemon/execution/program_fixture.h"
 
-/// The journal on a disk whose power may be cut at any write, and which may then have kept any part of what was not
-/// synced; and on one that is full or broken.
+/// The journal on a disk whose power may be cut at any write, and which may then have kept any part of what
+/// was not synced; and on one that is full or broken.
 namespace hilbrush {
 namespace {
 
@@ -42,8 +42,8 @@ struct Disk {
     if (now >= fails_from && now < fails_until) throw std::runtime_error("journal: no space left on device");
   }
 
-  /// Of each page that was not synced: the old, the new, one up to some byte and the other from there, or either in
-  /// each sector.
+  /// Of each page that was not synced: the old, the new, one up to some byte and the other from there, or
+  /// either in each sector.
   void cut_power(std::mt19937& random) {
     for (const std::size_t page : dirty) {
       const auto begin = page * kPage;
@@ -103,9 +103,12 @@ class DiskStorage final : public JournalStorage {
 class Part {
  public:
   Part(std::size_t count, unsigned seed)
-      : count_(count), disk_(std::make_shared<Disk>(Journal::bytes_for(count))), random_(seed), light_(count) {
-    const Journal journal =
-        Journal::create(std::make_unique<DiskStorage>(disk_), count, kCutProgram, "boot 0");  // published: durable
+      : count_(count),
+        disk_(std::make_shared<Disk>(Journal::bytes_for(count))),
+        random_(seed),
+        light_(count) {
+    const Journal journal = Journal::create(std::make_unique<DiskStorage>(disk_), count, kCutProgram,
+                                            "boot 0");  // published: durable
   }
 
   /// Paints until the power is cut, the process killed or the end; true at the end.
@@ -230,7 +233,8 @@ TEST(PowerCutTest, AtMostOneWindowIsInDoubt) {
     std::mt19937 random(seed);
     constexpr std::size_t kCount = 1100;
     const auto disk = std::make_shared<Disk>(Journal::bytes_for(kCount));
-    std::optional<Journal> journal(Journal::create(std::make_unique<DiskStorage>(disk), kCount, kCutProgram, "before"));
+    std::optional<Journal> journal(
+        Journal::create(std::make_unique<DiskStorage>(disk), kCount, kCutProgram, "before"));
     disk->operations = 0;
     disk->cut_at = random() % 2200;
     std::size_t exposed = 0;
@@ -259,8 +263,8 @@ TEST(PowerCutTest, AtMostOneWindowIsInDoubt) {
   EXPECT_GT(most, Journal::kWindow / 2) << "the cuts must come near the bound, or they show nothing";
 }
 
-/// A disk that is full, or fails, from any operation on: the run ends before the dot, and when there is room again the
-/// job goes on where it was.
+/// A disk that is full, or fails, from any operation on: the run ends before the dot, and when there is room
+/// again the job goes on where it was.
 TEST(PowerCutTest, AFullDiskStopsTheJobBeforeTheDotNotInIt) {
   const CellDescription description = test::small_cell();
   const auto program = test::small_program(600);

@@ -11,14 +11,16 @@
 #include "sampling/base/angles.h"
 #include "tests/support/temporary_folder.h"
 
-/// Cells and programs small enough to reason about: no mesh, no planner; positions follow from nothing but the joints.
+/// Cells and programs small enough to reason about: no mesh, no planner; positions follow from nothing but
+/// the joints.
 namespace hilbrush::test {
 
 inline CellDescription small_cell(double time_scale = 0) {
   CellDescription cell;
   cell.name = "small";
   cell.sha256 = std::string(64, 'c');
-  const auto axis = [](double min, double max, double speed, double acceleration, double saturation, double home) {
+  const auto axis = [](double min, double max, double speed, double acceleration, double saturation,
+                       double home) {
     return AxisDescription{min, max, speed, acceleration, saturation, home};
   };
   cell.axes[kJ1] = axis(-132 * kDegree, 132 * kDegree, 720 * kDegree, 8000 * kDegree, 10 * kDegree, 0.5);
@@ -51,8 +53,8 @@ inline Exposure small_exposure(std::size_t i, const Joints& joints) {
   return exposure;
 }
 
-/// Small steps of the arm, a table move every 50 exposures with two way-points before it, a way home. Each exposure's
-/// joints are its own.
+/// Small steps of the arm, a table move every 50 exposures with two way-points before it, a way home. Each
+/// exposure's joints are its own.
 inline ExposureProgram small_program(std::size_t count, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> step(-.004, .004);

@@ -12,7 +12,8 @@
 #include "sim/devices/sim_cell.h"
 #include "tests/daemon/execution/program_fixture.h"
 
-/// The safety invariants as a witness sees them: what the simulated laser really emitted against what the journal says.
+/// The safety invariants as a witness sees them: what the simulated laser really emitted against what the
+/// journal says.
 namespace hilbrush::test {
 
 /// A simulated cell and its witness.
@@ -41,7 +42,8 @@ class WitnessedCell {
     bring_up(sim_.cell());
   }
 
-  ExecutionResult paint(const ExposureProgram& program, Journal& journal, const ExecutionProgress& progress = {}) {
+  ExecutionResult paint(const ExposureProgram& program, Journal& journal,
+                        const ExecutionProgress& progress = {}) {
     return execute(program, {}, cell(), description, journal, control, progress);
   }
   /// The same through other devices, which stand before those of the simulated cell.
@@ -65,8 +67,8 @@ inline JointsKey key_of(const Joints& joints) {
   return key;
 }
 
-/// The safety invariants, by the witness: no dot twice, all done dots once and in full, those in doubt at most once,
-/// nothing else, never in motion.
+/// The safety invariants, by the witness: no dot twice, all done dots once and in full, those in doubt at
+/// most once, nothing else, never in motion.
 inline void expect_painted_once(const ExposureProgram& program, const Journal& journal,
                                 const std::vector<Emission>& emissions) {
   std::map<JointsKey, std::vector<Emission>> by_pose;

@@ -163,7 +163,8 @@ TEST(ServerTcpTest, ATakenPortIsASentence) {
   first.begin();
   const std::string address = first.daemon().tcp_address();
   second.options.settings = first.options.settings;
-  second.options.settings.tcp->port = static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
+  second.options.settings.tcp->port =
+      static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1)));
   EXPECT_THROW(second.begin(), std::runtime_error);
 }
 

@@ -148,7 +148,8 @@ TEST_F(ServerActsTest, AClearThatConnectsForLongKeepsNobodyWaiting) {
   ASSERT_TRUE(connecting.wait_for_arrival());
   EXPECT_EQ(b->result("cell.status").at("cell").at("state"), "clearing");
   EXPECT_EQ(b->error_code("cell.arm"), kRpcWrongState);
-  EXPECT_EQ(b->result("cell.stop").at("cell").at("state"), "stopped") << "while the robot is still being connected";
+  EXPECT_EQ(b->result("cell.stop").at("cell").at("state"), "stopped")
+      << "while the robot is still being connected";
   connecting.open();
   const Json answer = a->read_message();
   EXPECT_EQ(answer.at("error").at("code"), kRpcWrongState) << "the clear was overtaken";

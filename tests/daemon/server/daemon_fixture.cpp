@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Speaks the pipeline's protocol. What planning would make lies prepared beside the submitted model: MODEL.program,
-/// MODEL.report.
+/// Speaks the pipeline's protocol. What planning would make lies prepared beside the submitted model:
+/// MODEL.program, MODEL.report.
 constexpr const char* kFakePipeline = R"SH(#!/bin/sh
 prepared='@PREPARED@'
 verb=$1; shift
@@ -223,9 +223,11 @@ fs::path DaemonWorld::model(const std::string& name, std::size_t exposures) {
   write_program(program, folder_ / (name + ".program"));
   Json report{
       {"result",
-       {{"dots", {{"placed", exposures + 5}, {"exposed", 0}, {"skipped", {{"occluded", 3}, {"incidence", 2}}}}},
+       {{"dots",
+         {{"placed", exposures + 5}, {"exposed", 0}, {"skipped", {{"occluded", 3}, {"incidence", 2}}}}},
         {"mesh", {{"size_mm", {80, 80, 60}}, {"min_mm", {-40, -40, 0}}, {"max_mm", {40, 40, 60}}}},
-        {"skipped", Json::array({{{"reason", "occluded"}, {"count", 3}, {"text", "beam blocked by the object"}}})},
+        {"skipped",
+         Json::array({{{"reason", "occluded"}, {"count", 3}, {"text", "beam blocked by the object"}}})},
         {"suggestion", {{"text", "a post of 90 mm would reach more"}}},
         {"time_s", {{"total", .04 * static_cast<double>(exposures)}}}}}};
   if (name.starts_with("hidden"))
@@ -234,9 +236,12 @@ fs::path DaemonWorld::model(const std::string& name, std::size_t exposures) {
   return file;
 }
 
-std::string DaemonWorld::submit(LineClient& client, const fs::path& model, const std::string& state, bool dry_run) {
+std::string DaemonWorld::submit(LineClient& client, const fs::path& model, const std::string& state,
+                                bool dry_run) {
   const Json job =
-      client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}, {"dry_run", dry_run}})
+      client
+          .result("job.submit",
+                  {{"model", model.string()}, {"settings", {{"size_mm", 80}}}, {"dry_run", dry_run}})
           .at("job");
   EXPECT_EQ(job.at("state"), "queued");
   const auto id = job.at("id").get<std::string>();

@@ -10,8 +10,8 @@
 #include "daemon/server/daemon.h"
 #include "tests/daemon/execution/program_fixture.h"
 
-/// A daemon in this process on a socket of its own, clients that talk to it as any other would, and a shell script in
-/// the pipeline's place, which answers by the model's name.
+/// A daemon in this process on a socket of its own, clients that talk to it as any other would, and a shell
+/// script in the pipeline's place, which answers by the model's name.
 namespace hilbrush::test {
 
 using Json = nlohmann::ordered_json;
@@ -74,17 +74,16 @@ class DaemonWorld {
   void end();
   const Daemon& daemon() const { return *daemon_; }
   LineClient client() const { return LineClient(options.socket); }
-  /// A model of that name that the script turns into a program of `exposures` exposures, or into the trouble that its
-  /// name says: hang, crash, fat, bad, mute, garbage, endless, outside, stray (a program for another model), older (by
-  /// another version), wild (one beyond the limits), hidden (all dots
-  /// skipped), lost (no approach), slowway (an endless one), long (the longest
-  /// pulses).
+  /// A model of that name that the script turns into a program of `exposures` exposures, or into the trouble
+  /// that its name says: hang, crash, fat, bad, mute, garbage, endless, outside, stray (a program for another
+  /// model), older (by another version), wild (one beyond the limits), hidden (all dots skipped), lost (no
+  /// approach), slowway (an endless one), long (the longest pulses).
   std::filesystem::path model(const std::string& name, std::size_t exposures = 100);
   /// Submits and waits until the job is in `state`.
   std::string submit(LineClient& client, const std::filesystem::path& model, const std::string& state,
                      bool dry_run = false);
-  /// Polls the job until it is in `state`; throws, which fails the test, if it gets into a final state that is another,
-  /// or takes too long.
+  /// Polls the job until it is in `state`; throws, which fails the test, if it gets into a final state that
+  /// is another, or takes too long.
   Json wait_for(LineClient& client, const std::string& id, const std::string& state);
   /// stopped -> clear -> arm.
   void clear_and_arm(LineClient& client);

@@ -36,7 +36,8 @@ class DaemonProcess {
                                        options.pipeline.string(),
                                        "--log-level",
                                        "off"};
-    if (options.time_scale) arguments.insert(arguments.end(), {"--time-scale", std::to_string(*options.time_scale)});
+    if (options.time_scale)
+      arguments.insert(arguments.end(), {"--time-scale", std::to_string(*options.time_scale)});
     std::vector<char*> argv;
     for (auto& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);

@@ -10,8 +10,8 @@
 #include "config/rpc_errors.h"
 #include "tests/daemon/server/daemon_fixture.h"
 
-/// Requests made after the daemon's own schemas, right and wrong in every way that these allow, and damaged in transit.
-/// rpc_fuzzer.cpp looks for what the schemas do not know.
+/// Requests made after the daemon's own schemas, right and wrong in every way that these allow, and damaged
+/// in transit. rpc_fuzzer.cpp looks for what the schemas do not know.
 namespace hilbrush {
 namespace {
 
@@ -70,7 +70,8 @@ class RequestMaker {
     if (schema.contains("enum")) return schema["enum"][random_() % schema["enum"].size()];
     const Json type = schema.value("type", Json("string"));
     if (type == "string") {
-      static const char* const kTexts[] = {"1", "2", "77", "", "/no/such.wrl", "/tmp", "secret", "\x01", "9999999999"};
+      static const char* const kTexts[] = {"1",    "2",      "77",   "",          "/no/such.wrl",
+                                           "/tmp", "secret", "\x01", "9999999999"};
       return kTexts[random_() % std::size(kTexts)];
     }
     if (type == "integer") return static_cast<std::int64_t>(random_() % 5);

@@ -25,7 +25,8 @@ using test::LineClient;
 using test::named;
 using test::placed;
 
-/// The witness: emissions by exposure of the job's program, and none that belongs to no exposure or was made in motion.
+/// The witness: emissions by exposure of the job's program, and none that belongs to no exposure or was made
+/// in motion.
 std::vector<std::size_t> emission_counts(const fs::path& job_folder) {
   const auto program = read_program(job_folder / "program.ply");
   std::map<std::array<long long, kAxisCount>, std::size_t> index;
@@ -79,7 +80,8 @@ TEST(ServerJobsTest, AJobGoesTheWholeWay) {
     state = update.at("job").at("state").get<std::string>();
     const Json& dots = update.at("job").at("dots");
     EXPECT_EQ(dots.at("placed").get<int>(), dots.at("exposed").get<int>() + dots.at("in_doubt").get<int>() +
-                                                dots.at("remaining").get<int>() + dots.at("skipped").get<int>());
+                                                dots.at("remaining").get<int>() +
+                                                dots.at("skipped").get<int>());
   }
   job = client.result("job.get", named(id)).at("job");
   EXPECT_EQ(job.at("dots").at("exposed"), 200);
@@ -115,7 +117,8 @@ TEST(ServerJobsTest, StopsPausesAndResumesUntilEveryDotIsPaintedOnce) {
     operator_a.result("cell.clear");
     EXPECT_EQ(operator_a.error_code("job.resume", named(id)), kRpcWrongState) << "idle: arm first";
     operator_a.result("cell.arm");
-    EXPECT_EQ(operator_a.error_code("job.resume", named(id)), kRpcWrongState) << "stopped since: confirm the part";
+    EXPECT_EQ(operator_a.error_code("job.resume", named(id)), kRpcWrongState)
+        << "stopped since: confirm the part";
     EXPECT_EQ(operator_a.result("job.resume", placed(id)).at("job").at("state"), "painting");
   }
   operator_a.result("job.pause", named(id));
@@ -145,12 +148,14 @@ TEST(ServerJobsTest, DotsInDoubtAreExposedAgainOnlyWhenOrdered) {
   client.result("job.start", placed(id));
   Json job;
   const auto now = [&] { return client.result("job.get", named(id)).at("job"); };
-  // Until a stop happens to cut a pulse, in which the cell spends most of its time; each after some dots more.
+  // Until a stop happens to cut a pulse, in which the cell spends most of its time; each after some dots
+  // more.
   for (int round = 0; round < 100; ++round) {
     const Json before = now();
     for (job = before; job.at("state") == "painting" && job.at("dots") == before.at("dots");) job = now();
     ASSERT_NE(job.at("state"), "done") << "no stop has cut a pulse";
-    std::this_thread::sleep_for(std::chrono::microseconds(137 * round % 2000));  // another phase of the dot each time
+    std::this_thread::sleep_for(
+        std::chrono::microseconds(137 * round % 2000));  // another phase of the dot each time
     client.result("cell.stop");
     job = world.wait_for(client, id, "paused");
     if (job.at("dots").at("in_doubt").get<int>() > 0) break;
@@ -239,7 +244,8 @@ TEST(ServerJobsTest, PipelinesInTroubleFailTheirJobsWithASentenceAndDisturbNoPai
   for (const auto& [name, sentence] : troubles) {
     const auto id = world.submit(client, world.model(name), "failed", name == std::string("mute.wrl"));
     const Json error = client.result("job.get", named(id)).at("job").at("error");
-    EXPECT_NE(error.at("message").get<std::string>().find(sentence), std::string::npos) << name << ": " << error.dump();
+    EXPECT_NE(error.at("message").get<std::string>().find(sentence), std::string::npos)
+        << name << ": " << error.dump();
   }
   const auto dry = world.submit(client, world.model("dry.wrl"), "done", true);
   EXPECT_EQ(client.error_code("job.start", placed(dry)), kRpcWrongState);
@@ -259,8 +265,8 @@ TEST(ServerJobsTest, AModelBelowALinkedFolderIsTaken) {
   fs::create_directories(real);
   fs::copy_file(model, real / "linked.wrl");
   fs::create_directory_symlink(real, world.folder() / "link");
-  const auto id = client.result(
-      "job.submit", {{"model", (world.folder() / "link" / "linked.wrl").string()}, {"settings", {{"size_mm", 80}}}});
+  const auto id = client.result("job.submit", {{"model", (world.folder() / "link" / "linked.wrl").string()},
+                                               {"settings", {{"size_mm", 80}}}});
   EXPECT_EQ(world.wait_for(client, id.at("job").at("id").get<std::string>(), "ready").at("model_copy"),
             (world.job_folder(id.at("job").at("id").get<std::string>()) / "model" / "linked.wrl").string());
 }
@@ -271,7 +277,8 @@ TEST(ServerJobsTest, QuickCancelsWhileAModelIsCopiedEndNothingButTheirJobs) {
   world.begin();
   LineClient client = world.client();
   const auto submit = [&](const fs::path& model) {
-    const Json answer = client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}});
+    const Json answer =
+        client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}});
     return answer.at("job").at("id").get<std::string>();
   };
   const auto large = world.model("large.wrl");
@@ -284,7 +291,8 @@ TEST(ServerJobsTest, QuickCancelsWhileAModelIsCopiedEndNothingButTheirJobs) {
   const auto hang = world.model("hang.wrl");
   for (int i = 0; i < 60; ++i) others.push_back(submit(hang));
   client.result("job.cancel", named(copied));
-  for (const auto& id : others) EXPECT_EQ(client.result("job.cancel", named(id)).at("job").at("state"), "cancelled");
+  for (const auto& id : others)
+    EXPECT_EQ(client.result("job.cancel", named(id)).at("job").at("state"), "cancelled");
   world.submit(client, world.model("cup.wrl"), "ready");
   EXPECT_FALSE(fs::exists(copy)) << "nothing of it is left";
 }
@@ -310,11 +318,11 @@ TEST(ServerJobsTest, CancelWorksInEveryStateThatIsNotFinal) {
   world.begin();
   LineClient client = world.client();
   const auto planning = world.submit(client, world.model("hang.wrl"), "planning");
-  const auto queued =
-      client.result("job.submit", {{"model", world.model("cup.wrl", 3000).string()}, {"settings", {{"size_mm", 80}}}});
+  const auto queued = client.result(
+      "job.submit", {{"model", world.model("cup.wrl", 3000).string()}, {"settings", {{"size_mm", 80}}}});
   const auto queued_id = queued.at("job").at("id").get<std::string>();
-  const auto waiting =
-      client.result("job.submit", {{"model", world.model("cup2.wrl").string()}, {"settings", {{"size_mm", 80}}}});
+  const auto waiting = client.result(
+      "job.submit", {{"model", world.model("cup2.wrl").string()}, {"settings", {{"size_mm", 80}}}});
   const auto waiting_id = waiting.at("job").at("id").get<std::string>();
   EXPECT_EQ(client.result("job.cancel", named(waiting_id)).at("job").at("state"), "cancelled");
   EXPECT_EQ(client.result("job.cancel", named(planning)).at("job").at("state"), "cancelled");
@@ -337,7 +345,8 @@ TEST(ServerJobsTest, AJobOfWhichNoDotCanBeExposedFailsWithASentence) {
   for (const bool is_dry : {false, true}) {
     const auto id = world.submit(client, world.model("hidden.wrl"), "failed", is_dry);
     const Json job = client.result("job.get", named(id)).at("job");
-    EXPECT_NE(job.at("error").at("message").get<std::string>().find("none of the 5 dots can be exposed: beam blocked"),
+    EXPECT_NE(job.at("error").at("message").get<std::string>().find(
+                  "none of the 5 dots can be exposed: beam blocked"),
               std::string::npos)
         << job.at("error");
     EXPECT_EQ(job.at("dots").at("skipped"), 5);
@@ -373,7 +382,8 @@ TEST(ServerJobsTest, JobsSurviveARestart) {
   EXPECT_GE(job.at("dots").at("exposed").get<int>(), 100);
   EXPECT_LE(job.at("dots").at("in_doubt").get<int>(), 1);
   world.clear_and_arm(client);
-  EXPECT_EQ(client.error_code("job.resume", named(painting)), kRpcWrongState) << "the part must be confirmed again";
+  EXPECT_EQ(client.error_code("job.resume", named(painting)), kRpcWrongState)
+      << "the part must be confirmed again";
   client.result("job.resume", {{"id", painting}, {"in_doubt", "leave"}, {"part_in_place", true}});
   const Json end = world.wait_for(client, painting, "done");
   EXPECT_EQ(end.at("dots").at("exposed").get<int>() + end.at("dots").at("in_doubt").get<int>(), 2000);
@@ -429,9 +439,11 @@ TEST(ServerJobsTest, BadOrdersAreRefusedWithTheirPlace) {
   EXPECT_EQ(refusal({{"model", (world.folder() / "fifo").string()}}).at("code"), kRpcBadInput) << "a pipe";
   const auto model = world.model("cup.wrl").string();
   EXPECT_EQ(refusal({{"model", model}, {"settings", {{"size_mm", -3}}}}).at("code"), kRpcBadInput);
-  EXPECT_NE(refusal({{"model", model}, {"settings", {{"color", "red"}}}}).dump().find("color"), std::string::npos);
-  EXPECT_EQ(refusal({{"model", model}, {"settings", {{"size_mm", 80}, {"cell", "../../etc/passwd"}}}}).at("code"),
-            kRpcBadInput);
+  EXPECT_NE(refusal({{"model", model}, {"settings", {{"color", "red"}}}}).dump().find("color"),
+            std::string::npos);
+  EXPECT_EQ(
+      refusal({{"model", model}, {"settings", {{"size_mm", 80}, {"cell", "../../etc/passwd"}}}}).at("code"),
+      kRpcBadInput);
   EXPECT_EQ(refusal({{"model", model}, {"modle", 1}}).at("data").at("at"), "$.modle");
   EXPECT_EQ(client.error_code("job.get", named("99")), kRpcNoSuchJob);
   EXPECT_EQ(client.error_code("job.get", named("../7")), kRpcNoSuchJob);

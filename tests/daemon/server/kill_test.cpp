@@ -61,9 +61,10 @@ TEST(ServerKillTest, AHangUpEndsNothingAndFilesAreForOwnerAndGroupWhateverTheUma
   EXPECT_EQ(client->result("cell.status").at("cell").at("state"), "stopped");
   const std::string id = world.submit(*client, world.model("cup.wrl", 5), "done", true);
   using std::filesystem::perms;
-  for (const auto& file : {world.options.state / "jobs.sqlite", world.options.state / "audit.log", world.job_folder(id),
-                           world.job_folder(id) / "job.json"})
-    EXPECT_EQ(std::filesystem::status(file).permissions() & (perms::others_all | perms::group_write), perms::none)
+  for (const auto& file : {world.options.state / "jobs.sqlite", world.options.state / "audit.log",
+                           world.job_folder(id), world.job_folder(id) / "job.json"})
+    EXPECT_EQ(std::filesystem::status(file).permissions() & (perms::others_all | perms::group_write),
+              perms::none)
         << file;
   EXPECT_EQ(daemon.end(SIGTERM), 0);
 }
@@ -97,7 +98,8 @@ TEST(ServerKillTest, AKilledDaemonLeavesAtMostOneDotInDoubtAndTheRestIsPaintedOn
       expect_painted_once(world.job_folder(id), done);
       break;
     }
-    while (client->result("job.get", {{"id", id}}).at("job").at("stage") != "paint") std::this_thread::yield();
+    while (client->result("job.get", {{"id", id}}).at("job").at("stage") != "paint")
+      std::this_thread::yield();
     std::this_thread::sleep_for(std::chrono::milliseconds(20 + random() % 100));
     EXPECT_EQ(daemon.end(SIGKILL), -SIGKILL);
   }
@@ -165,8 +167,9 @@ TEST(ServerKillTest, AFullDiskStopsTheJobAndNothingElse) {
   EXPECT_FALSE(paused.at("error").is_null());
   EXPECT_EQ(client->result("cell.status").at("cell").at("laser"), "off");
   EXPECT_FALSE(client->result("system.info").at("system").at("store_fault").is_null());
-  EXPECT_NE(
-      client->error_code("job.submit", {{"model", world.model("b.wrl").string()}, {"settings", {{"size_mm", 80}}}}), 0);
+  EXPECT_NE(client->error_code("job.submit",
+                               {{"model", world.model("b.wrl").string()}, {"settings", {{"size_mm", 80}}}}),
+            0);
   EXPECT_EQ(client->result("cell.stop").at("cell").at("state"), "stopped") << "whatever else fails";
   ASSERT_EQ(::prlimit(daemon.pid(), RLIMIT_FSIZE, &before, nullptr), 0);
   world.clear_and_arm(*client);
@@ -182,7 +185,8 @@ TEST(ServerKillTest, AFullDiskStopsTheJobAndNothingElse) {
 /// In place of systemd: the other end of its notification socket.
 class NotifySocket {
  public:
-  explicit NotifySocket(const std::filesystem::path& path) : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  explicit NotifySocket(const std::filesystem::path& path)
+      : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);

@@ -1,5 +1,6 @@
-// libFuzzer target: whole conversations with a daemon. Each input is what one client sends before it ends its side; the
-// daemon must answer, close, and go on. The cell is the simulated one, the pipeline a program that fails at once.
+// libFuzzer target: whole conversations with a daemon. Each input is what one client sends before it ends its
+// side; the daemon must answer, close, and go on. The cell is the simulated one, the pipeline a program that
+// fails at once.
 //   rpc_fuzzer -max_total_time=600 -max_len=4096 tests/fuzz/corpus/rpc
 
 #include <sys/socket.h>

@@ -34,11 +34,12 @@ inline std::chrono::seconds soak_length(int by_default_s) {
 
 inline std::size_t open_descriptors() {
   namespace fs = std::filesystem;
-  return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator{}));
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator{}));
 }
 
-/// What this process holds. Under a sanitizer its allocator keeps freed memory resident by the hundred megabytes, so
-/// there it is what is allocated.
+/// What this process holds. Under a sanitizer its allocator keeps freed memory resident by the hundred
+/// megabytes, so there it is what is allocated.
 inline double held_mb() {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   return static_cast<double>(__sanitizer_get_current_allocated_bytes()) / (1 << 20);
@@ -52,7 +53,8 @@ inline double held_mb() {
 #endif
 }
 
-/// Clients that mean no good: half messages, nonsense, watchers that never read, connections dropped at any time.
+/// Clients that mean no good: half messages, nonsense, watchers that never read, connections dropped at any
+/// time.
 class Crowd {
  public:
   Crowd(DaemonWorld& world, unsigned seed) : world_(world), random_(seed), thread_([this] { run(); }) {}
@@ -157,7 +159,8 @@ inline void wait_for_clients_to_go(DaemonWorld& world) {
 }
 
 /// Paints one job after another among two crowds of clients.
-inline SoakTrace soak(DaemonWorld& world, std::chrono::seconds length, const std::function<void()>& paint_one_job) {
+inline SoakTrace soak(DaemonWorld& world, std::chrono::seconds length,
+                      const std::function<void()>& paint_one_job) {
   using Steady = std::chrono::steady_clock;
   SoakTrace trace;
   const auto run_until = [&](Steady::time_point end, unsigned crowd_seed) {

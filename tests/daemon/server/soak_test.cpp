@@ -12,8 +12,9 @@
 #include "tests/daemon/server/daemon_fixture.h"
 #include "tests/daemon/server/soak_support.h"
 
-/// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the cell, clients
-/// that come, send garbage and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N makes it N seconds.
+/// The daemon under everything at once, for long: jobs one after another, faults, stops, restarts of the
+/// cell, clients that come, send garbage and go. HILBRUSH_LONG=1 makes it an hour, HILBRUSH_SOAK_S=N makes it
+/// N seconds.
 namespace hilbrush {
 namespace {
 
@@ -40,7 +41,9 @@ class Soak {
     const int copies = random_() % 4 == 0 ? 2 : 1;
     const fs::path model = models_[random_() % models_.size()];
     const auto id =
-        client.result("job.submit", {{"model", model.string()}, {"settings", {{"size_mm", 80}}}, {"copies", copies}})
+        client
+            .result("job.submit",
+                    {{"model", model.string()}, {"settings", {{"size_mm", 80}}}, {"copies", copies}})
             .at("job")
             .at("id")
             .get<std::string>();
@@ -108,7 +111,8 @@ class Soak {
       for (std::size_t i = 0; i < kAxisCount; ++i) rounded[i] = std::llround(joints[i] * 1e10);
       return rounded;
     };
-    const auto file = folder / ("emissions" + (copy > 1 ? "-" + std::to_string(copy) : std::string()) + ".ply");
+    const auto file =
+        folder / ("emissions" + (copy > 1 ? "-" + std::to_string(copy) : std::string()) + ".ply");
     for (const auto& emission : read_emission_record(file)) {
       ASSERT_FALSE(emission.is_moving);
       ASSERT_EQ(++counts[key(emission.joints)], 1) << "a dot twice";
@@ -122,7 +126,8 @@ class Soak {
     ASSERT_EQ(exposed + in_doubt, program.exposures.size());
     ASSERT_GE(lit, exposed);
     ASSERT_LE(lit, exposed + in_doubt);
-    for (const auto& i : job.at("in_doubt")) counts.erase(key(program.exposures[i.get<std::size_t>()].joints));
+    for (const auto& i : job.at("in_doubt"))
+      counts.erase(key(program.exposures[i.get<std::size_t>()].joints));
     ASSERT_EQ(counts.size(), exposed);
   }
 
@@ -136,9 +141,10 @@ TEST(SoakTest, JobsFaultsAndClientsLeaveNoTraceInMemoryOrDescriptorsAndCountsAre
   const unsigned seed = 31;
   SCOPED_TRACE(seed);
   Soak soak(seed);
-  const test::SoakTrace trace = test::soak(soak.world(), test::soak_length(12), [&] { soak.paint_one_job(); });
-  std::cout << soak.jobs << " jobs, " << soak.disturbances << " disturbances, " << soak.doubts << " dots in doubt, "
-            << trace << "\n";
+  const test::SoakTrace trace =
+      test::soak(soak.world(), test::soak_length(12), [&] { soak.paint_one_job(); });
+  std::cout << soak.jobs << " jobs, " << soak.disturbances << " disturbances, " << soak.doubts
+            << " dots in doubt, " << trace << "\n";
   test::expect_no_trace(trace);
 }
 

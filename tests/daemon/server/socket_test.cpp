@@ -61,7 +61,8 @@ TEST(ServerSocketTest, TakesHalfPipelinedAndEmptyMessages) {
   for (const char byte : kStatus + "\r\n") client.send_bytes(std::string(1, byte));
   EXPECT_EQ(client.read_message().at("id"), 1);
   std::string many = "\n  \n";
-  for (int i = 0; i < 2000; ++i) many += R"({"jsonrpc":"2.0","method":"system.info","id":)" + std::to_string(i) + "}\n";
+  for (int i = 0; i < 2000; ++i)
+    many += R"({"jsonrpc":"2.0","method":"system.info","id":)" + std::to_string(i) + "}\n";
   std::thread sender([&] { client.send_bytes(many); });
   for (int i = 0; i < 2000; ++i) ASSERT_EQ(client.read_message().at("id"), i);
   sender.join();
@@ -71,9 +72,9 @@ TEST(ServerSocketTest, ServesBatchesAndNotifications) {
   DaemonWorld world;
   world.begin();
   LineClient client = world.client();
-  client.send_bytes("[" + kStatus +
-                    R"(,{"jsonrpc":"2.0","method":"cell.stop"},{"jsonrpc":"2.0","id":"b","method":"nothing"},5])" +
-                    "\n");
+  client.send_bytes(
+      "[" + kStatus +
+      R"(,{"jsonrpc":"2.0","method":"cell.stop"},{"jsonrpc":"2.0","id":"b","method":"nothing"},5])" + "\n");
   const Json answers = client.read_message();
   ASSERT_EQ(answers.size(), 3u) << answers.dump();
   EXPECT_EQ(answers[0].at("result").at("cell").at("state"), "stopped");
@@ -154,7 +155,8 @@ TEST(ServerSocketTest, ManyIdleClientsAndOneThatNeverReadsDisturbNobody) {
     idle[i]->send_bytes(kStatus.substr(0, i % kStatus.size()));  // half a message, for ever
 
   LineClient deaf = world.client();
-  const std::string watch = R"({"jsonrpc":"2.0","id":1,"method":"job.watch","params":{"id":")" + id + "\"}}\n";
+  const std::string watch =
+      R"({"jsonrpc":"2.0","id":1,"method":"job.watch","params":{"id":")" + id + "\"}}\n";
   const std::string discover = R"({"jsonrpc":"2.0","id":2,"method":"rpc.discover"})"
                                "\n";
   deaf.send_without_waiting(watch);
@@ -192,7 +194,8 @@ TEST(ServerSocketTest, ASlowWatcherGetsFewerUpdatesAndTheLastOne) {
   world.clear_and_arm(client);
   client.result("job.start", {{"id", id}, {"part_in_place", true}});
   world.wait_for(client, id, "done");
-  for (std::string state; state != "done";) state = watcher.next_update().at("job").at("state").get<std::string>();
+  for (std::string state; state != "done";)
+    state = watcher.next_update().at("job").at("state").get<std::string>();
   watcher.result("job.unwatch", {{"id", id}});
 }
 
@@ -284,7 +287,8 @@ TEST(ServerSocketTest, BadOptionsAreSentences) {
   };
   EXPECT_NE(sentence([](DaemonOptions& options) { options.cell = "no-such-cell"; }).find("no-such-cell"),
             std::string::npos);
-  EXPECT_NE(sentence([](DaemonOptions& options) { options.time_scale = -1; }).find("--time-scale"), std::string::npos);
+  EXPECT_NE(sentence([](DaemonOptions& options) { options.time_scale = -1; }).find("--time-scale"),
+            std::string::npos);
   EXPECT_FALSE(sentence([](DaemonOptions& options) { options.socket = "/nowhere/socket"; }).empty());
   EXPECT_NE(sentence([&](DaemonOptions& options) {
               options.socket = world.folder() / std::string(120, 's');
@@ -307,10 +311,10 @@ TEST(ServerSocketTest, DiscoverListsExactlyWhatIsServed) {
     EXPECT_EQ(client.error_code(name, {{"no such parameter", 1}}), kRpcBadParams) << name;
     for (const auto& param : method.at("params")) EXPECT_TRUE(param.at("schema").is_object()) << name;
   }
-  EXPECT_EQ(names, (std::set<std::string>{"job.submit", "job.list", "job.get", "job.start", "job.pause", "job.resume",
-                                          "job.move", "job.cancel", "job.watch", "job.unwatch", "cell.status",
-                                          "cell.stop", "cell.clear", "cell.arm", "cell.home", "system.info",
-                                          "rpc.discover", "session.open"}));
+  EXPECT_EQ(names, (std::set<std::string>{"job.submit", "job.list", "job.get", "job.start", "job.pause",
+                                          "job.resume", "job.move", "job.cancel", "job.watch", "job.unwatch",
+                                          "cell.status", "cell.stop", "cell.clear", "cell.arm", "cell.home",
+                                          "system.info", "rpc.discover", "session.open"}));
 }
 
 TEST(ServerSocketTest, TheCellIsClearedArmedAndHomedInThreeActs) {

@@ -16,7 +16,8 @@ TEST(DobotCodec, CommandsAreWrittenAsInTheManual) {
   EXPECT_EQ(dobot::encode("EnableRobot"), "EnableRobot()");
   EXPECT_EQ(dobot::encode("SpeedFactor", {80}), "SpeedFactor(80)");
   EXPECT_EQ(dobot::encode("DOExecute", {1, 0}), "DOExecute(1,0)");
-  EXPECT_EQ(dobot::encode_joint_move({1.5, -90, 123.4567891, 0}), "JointMovJ(1.500000,-90.000000,123.456789,0.000000)");
+  EXPECT_EQ(dobot::encode_joint_move({1.5, -90, 123.4567891, 0}),
+            "JointMovJ(1.500000,-90.000000,123.456789,0.000000)");
   const auto pulse = dobot::encode_pulse(2, 5);
   EXPECT_EQ(pulse[0] + pulse[1] + pulse[2] + pulse[3], "DO(2,1)wait(5)DO(2,0)Sync()");
 }
@@ -42,8 +43,9 @@ TEST(DobotCodec, RepliesAreTakenApart) {
 }
 
 TEST(DobotCodec, WhatIsNoReplyIsRefused) {
-  for (const char* text : {"", "0", "0,", "0,{}", "0,{},", "0,{},RobotMode", ",{},RobotMode()", "0,{,RobotMode()",
-                           "0;{};RobotMode()", "ok", "0,}{,RobotMode()", "99999999999999999999999,{},A()", "0,{},()"})
+  for (const char* text :
+       {"", "0", "0,", "0,{}", "0,{},", "0,{},RobotMode", ",{},RobotMode()", "0,{,RobotMode()",
+        "0;{};RobotMode()", "ok", "0,}{,RobotMode()", "99999999999999999999999,{},A()", "0,{},()"})
     EXPECT_FALSE(dobot::decode_reply(text)) << text;
 }
 

@@ -15,7 +15,9 @@ namespace hilbrush::test {
 /// A feedback packet as the manual's table of offsets has it.
 inline std::string dobot_packet(const dobot::Frame& frame) {
   std::string bytes(dobot::kFrameBytes, '\0');
-  const auto put = [&](std::size_t at, const auto& value) { std::memcpy(bytes.data() + at, &value, sizeof value); };
+  const auto put = [&](std::size_t at, const auto& value) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+  };
   put(0, std::uint16_t{1440});
   put(16, frame.digital_outputs);
   put(24, static_cast<std::uint64_t>(frame.mode));
@@ -30,7 +32,8 @@ inline std::string dobot_packet(const dobot::Frame& frame) {
   return bytes;
 }
 
-/// A Dobot controller that does nothing by itself: it accepts every command, and sends the frames it is given.
+/// A Dobot controller that does nothing by itself: it accepts every command, and sends the frames it is
+/// given.
 class DobotPeer {
  public:
   std::uint16_t dashboard_port() const { return dashboard_.port(); }

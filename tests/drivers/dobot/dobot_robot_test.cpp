@@ -48,7 +48,8 @@ class DobotFrames : public testing::Test {
     frame.mode = is_running ? dobot::Mode::kRunning : dobot::Mode::kEnabled;
     frame.time_ms += kFrameMs;
     peer.show(frame);
-    while (robot.status().read_s <= last_s && robot.status().state != DeviceState::kFault) std::this_thread::yield();
+    while (robot.status().read_s <= last_s && robot.status().state != DeviceState::kFault)
+      std::this_thread::yield();
   }
   bool is_in_position() { return robot.status().in_position; }
 
@@ -93,7 +94,8 @@ TEST_F(DobotFrames, SettlingIsCountedFromTheFirstThatShowsRest) {
   EXPECT_TRUE(is_in_position());
 }
 
-/// A move shorter than a frame: its set-point is there, nothing turns yet that a frame could tell, and it has begun.
+/// A move shorter than a frame: its set-point is there, nothing turns yet that a frame could tell, and it has
+/// begun.
 TEST_F(DobotFrames, OneThatRunsIsNotAtRestThoughAPulseHasJustEnded) {
   pulse();
   finish_pulse();

@@ -52,7 +52,8 @@ class GuardTest : public testing::Test {
 
   GuardArguments arguments() const {
     const bool is_cobolt = world->wire.endpoints().laser_driver == "cobolt";
-    GuardArguments result{is_cobolt ? "cobolt" : "obis", is_cobolt, world->laser_options(), world->clock.wall_s(1)};
+    GuardArguments result{is_cobolt ? "cobolt" : "obis", is_cobolt, world->laser_options(),
+                          world->clock.wall_s(1)};
     result.laser.heartbeats_missed = kBeatsMissed;  // more than on a real cell: this machine may be busy
     return result;
   }
@@ -199,7 +200,8 @@ TEST_F(GuardTest, APulseThatIsNotReportedOverInTimeEndsEmissionAndLatches) {
   while (is_emission_ordered() && Steady::now() < deadline) beat();
   EXPECT_FALSE(is_emission_ordered());
   const guard::Reply refusal = ask(guard::Verb::kArm);
-  EXPECT_NE(refusal.text.find("received no report in time that a pulse was over"), std::string::npos) << refusal.text;
+  EXPECT_NE(refusal.text.find("received no report in time that a pulse was over"), std::string::npos)
+      << refusal.text;
   ASSERT_EQ(refusal_of(guard::Verb::kClear), "");
   EXPECT_TRUE(ask(guard::Verb::kArm).is_ok);
 }
@@ -229,8 +231,8 @@ TEST_F(GuardTest, GarbageOnTheChannelDisarmsAndEnds) {
 }
 
 TEST_F(GuardTest, EveryCatchableSignalDisarms) {
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGUSR1, SIGALRM, SIGTSTP, SIGABRT, SIGSEGV, SIGBUS,
-                           SIGFPE, SIGILL, SIGXCPU, SIGRTMIN + 3}) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGUSR1, SIGALRM, SIGTSTP, SIGABRT, SIGSEGV,
+                           SIGBUS, SIGFPE, SIGILL, SIGXCPU, SIGRTMIN + 3}) {
     start();
     arm();
     ::kill(process.pid(), signal);
@@ -283,8 +285,8 @@ TEST_F(GuardTest, TimesSerialPulses) {
   ASSERT_EQ(refusal_of(guard::Verb::kGateOff), "");
   const auto emissions = world->emissions();
   ASSERT_EQ(emissions.size(), 5u);
-  // The simulated head reads its line when this machine lets it: on a busy one an end may be read late, or together
-  // with its beginning, and most ends may be. So the longest speaks for all.
+  // The simulated head reads its line when this machine lets it: on a busy one an end may be read late, or
+  // together with its beginning, and most ends may be. So the longest speaks for all.
   double longest_s = 0;
   for (const Emission& emission : emissions) longest_s = std::max(longest_s, emission.length_s);
   EXPECT_GE(longest_s, .03 - .02);
@@ -318,8 +320,9 @@ class GuardedHeadTest : public testing::Test {
   GuardedHeadTest() : world(WiredCell::quick()), process(std::make_shared<GuardProcess>()) {
     const GuardArguments arguments{"obis", false, world.laser_options(), world.clock.wall_s(1)};
     auto launch = [this, arguments] { return process->start(guard_program(), to_command_line(arguments)); };
-    laser = std::make_unique<GatedLaser>(std::make_unique<GuardedHead>(launch, GuardedHead::Options{}, world.clock),
-                                         world.robot->gate(1), world.laser_limits(), world.clock);
+    laser = std::make_unique<GatedLaser>(
+        std::make_unique<GuardedHead>(launch, GuardedHead::Options{}, world.clock), world.robot->gate(1),
+        world.laser_limits(), world.clock);
   }
   WiredCell world;
   std::shared_ptr<GuardProcess> process;

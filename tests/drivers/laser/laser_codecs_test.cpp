@@ -23,7 +23,9 @@ TEST(ObisCodec, CommandsAndAnswers) {
 
 /// The words that the makers' drivers list.
 TEST(ObisCodec, StatusWords) {
-  const auto has = [](const char* word, std::uint32_t bit) { return (*obis::decode_hex_word(word) & bit) != 0; };
+  const auto has = [](const char* word, std::uint32_t bit) {
+    return (*obis::decode_hex_word(word) & bit) != 0;
+  };
   EXPECT_TRUE(has("C8001002", obis::kEmission));  // key on, emitting
   EXPECT_FALSE(has("C8001002", obis::kInterlockOpen | obis::kKeyOut | obis::kAnyFault));
   EXPECT_TRUE(has("CC000008", obis::kInterlockOpen));  // key on, interlock open
@@ -87,10 +89,12 @@ TEST(GuardCodec, MessagesComeBackAsTheyWere) {
 }
 
 TEST(GuardCodec, AnythingElseIsNoMessage) {
-  for (const char* text : {"", "beat", "arm", "1", "1 ", "1 fly", "1 arm now", "1 power", "1 power much", "1 power nan",
-                           "1 power inf", "-1 arm", "99999999999 arm", "1  arm", "1 pulse .5 "})
+  for (const char* text :
+       {"", "beat", "arm", "1", "1 ", "1 fly", "1 arm now", "1 power", "1 power much", "1 power nan",
+        "1 power inf", "-1 arm", "99999999999 arm", "1  arm", "1 pulse .5 "})
     EXPECT_FALSE(guard::decode_request(text)) << text;
-  for (const char* text : {"", "status", "status 1", "status 9 1 0 0 0 x", "status 1 2 0 0 0 ", "status -1 1 0 0 0 "})
+  for (const char* text :
+       {"", "status", "status 1", "status 9 1 0 0 0 x", "status 1 2 0 0 0 ", "status -1 1 0 0 0 "})
     EXPECT_FALSE(guard::decode_status(text)) << text;
   for (const char* text : {"", "ok", "1 maybe", "x ok"}) EXPECT_FALSE(guard::decode_reply(text)) << text;
   EXPECT_FALSE(guard::decode_request(std::string(guard::kMessageMax + 1, '1')));

@@ -66,7 +66,8 @@ class ProgramFile : public testing::Test {
           << "exposure " << i;
     }
     for (std::size_t i = 0; i < a.vias.size(); ++i)
-      EXPECT_TRUE(a.vias[i].before_exposure == b.vias[i].before_exposure && a.vias[i].joints == b.vias[i].joints);
+      EXPECT_TRUE(a.vias[i].before_exposure == b.vias[i].before_exposure &&
+                  a.vias[i].joints == b.vias[i].joints);
   }
   std::string bytes() const {
     std::ifstream in(file_, std::ios::binary);
@@ -82,7 +83,8 @@ class ProgramFile : public testing::Test {
 
 TEST_F(ProgramFile, RoundTrip) {
   for (const auto& [exposures, vias] : {std::pair{0, 0}, {1, 0}, {0, 2}, {7, 3}, {9000, 5000}}) {
-    const ExposureProgram program = some_program(static_cast<std::size_t>(exposures), static_cast<std::size_t>(vias));
+    const ExposureProgram program =
+        some_program(static_cast<std::size_t>(exposures), static_cast<std::size_t>(vias));
     write_program(program, file_);
     expect_same(read_program(file_), program);
   }

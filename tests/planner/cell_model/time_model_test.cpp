@@ -13,9 +13,10 @@ namespace {
 
 TEST(TimeModel, TrapezoidClosedForms) {
   EXPECT_EQ(trapezoid_s(0, 2, 4), 0);
-  EXPECT_DOUBLE_EQ(trapezoid_s(.25, 2, 4), 2 * std::sqrt(.25 / 4));  // a triangle: full speed is never reached
-  EXPECT_DOUBLE_EQ(trapezoid_s(1, 2, 4), 1);                         // just reached: .5 s up, .5 s down
-  EXPECT_DOUBLE_EQ(trapezoid_s(5, 2, 4), .5 + 2 + .5);               // and 4 m at 2 m/s between
+  EXPECT_DOUBLE_EQ(trapezoid_s(.25, 2, 4),
+                   2 * std::sqrt(.25 / 4));             // a triangle: full speed is never reached
+  EXPECT_DOUBLE_EQ(trapezoid_s(1, 2, 4), 1);            // just reached: .5 s up, .5 s down
+  EXPECT_DOUBLE_EQ(trapezoid_s(5, 2, 4), .5 + 2 + .5);  // and 4 m at 2 m/s between
 }
 
 TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
@@ -29,8 +30,8 @@ TEST(TimeModel, MoveIsTheSlowestAxisInWholeTicks) {
     double slowest = 0;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       to[i] = cell.axes[i].min + share(random) * (cell.axes[i].max - cell.axes[i].min);
-      slowest = std::max(slowest,
-                         trapezoid_s(std::abs(to[i] - home[i]), cell.axes[i].speed_max, cell.axes[i].acceleration_max));
+      slowest = std::max(slowest, trapezoid_s(std::abs(to[i] - home[i]), cell.axes[i].speed_max,
+                                              cell.axes[i].acceleration_max));
     }
     const double move = move_s(cell, home, to);
     const double ticks = move / cell.timing.tick_s;
@@ -60,7 +61,8 @@ TEST(TimeModel, JointsDuringAMoveKeepSpeedAndAcceleration) {
   }
 }
 
-/// A straight line in joint space, as fast as the limits allow: some joint of each chain is at one of them at any time.
+/// A straight line in joint space, as fast as the limits allow: some joint of each chain is at one of them at
+/// any time.
 TEST(TimeModel, CoordinatedJointsRunStraightAndArriveTogether) {
   CellDescription cell = default_cell();
   cell.axes[kJ2].time_factor = 1.5;
@@ -98,7 +100,8 @@ TEST(TimeModel, CoordinatedJointsRunStraightAndArriveTogether) {
           EXPECT_LE(acceleration, 1 + 1e-3) << "seed " << kSeed;
           used = std::max({used, speed, acceleration});
         }
-        EXPECT_GT(used, .49) << "seed " << kSeed << ", move " << n << " at " << t / end_s;  // .5 where it turns
+        EXPECT_GT(used, .49) << "seed " << kSeed << ", move " << n << " at "
+                             << t / end_s;  // .5 where it turns
       }
       const Joints end = at(end_s * (1 + 1e-12));
       const Joints before = at(end_s * .999);

@@ -35,7 +35,9 @@ struct Work {
     return i;
   }
   ToolPose tool(std::size_t i) { return Kinematics(cell).tool_pose(exposure(i).joints); }
-  Eigen::Vector3d flange_O(std::size_t i) { return tool(i).focus_O - cell.arm.flange_to_focus_m * tool(i).beam_O; }
+  Eigen::Vector3d flange_O(std::size_t i) {
+    return tool(i).focus_O - cell.arm.flange_to_focus_m * tool(i).beam_O;
+  }
   /// A triangle of 4 mm across a direction, of which planning knew nothing.
   void add_screen(const Eigen::Vector3d& across_O, const Eigen::Vector3d& center_O) {
     const Eigen::Vector3d u = .004 * across_O.unitOrthogonal();
@@ -56,8 +58,8 @@ struct Work {
     Joints& joints = exposure(i).joints;
     const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
     const Elbow elbow = joints[kJ2] > 0 ? Elbow::kPositive : Elbow::kNegative;
-    ASSERT_TRUE(
-        kinematics.solve_arm(table.to_W(exposure(i).position_O), kinematics.yaw(joints) + angle, elbow, joints));
+    ASSERT_TRUE(kinematics.solve_arm(table.to_W(exposure(i).position_O), kinematics.yaw(joints) + angle,
+                                     elbow, joints));
   }
   void flip_elbow(std::size_t i) { flip_elbow(i, exposure(i).joints); }
   void flip_elbow(std::size_t i, Joints& joints) const {
@@ -65,8 +67,8 @@ struct Work {
     const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
     const Elbow other = joints[kJ2] > 0 ? Elbow::kNegative : Elbow::kPositive;
     const double j4 = joints[kJ4];
-    ASSERT_TRUE(
-        kinematics.solve_arm(table.to_W(plan.program.exposures[i].position_O), kinematics.yaw(joints), other, joints));
+    ASSERT_TRUE(kinematics.solve_arm(table.to_W(plan.program.exposures[i].position_O), kinematics.yaw(joints),
+                                     other, joints));
     joints[kJ4] = kinematics.unwrap_near(kJ4, joints[kJ4], j4);
   }
 };
@@ -77,7 +79,8 @@ const Work& good_work() {
 }
 
 TEST(ProgramCheck, AGoodProgramPasses) {
-  for (const auto& fault : good_work().check()) ADD_FAILURE() << "exposure " << fault.exposure << ": " << fault.what;
+  for (const auto& fault : good_work().check())
+    ADD_FAILURE() << "exposure " << fault.exposure << ": " << fault.what;
 }
 
 struct Spoiling {
@@ -108,7 +111,8 @@ TEST_P(SpoiltProgram, IsCaught) {
 
 constexpr std::size_t kVictim = 200;
 
-/// The move whose joints at its middle differ most between two motions, and the joints there in the other one.
+/// The move whose joints at its middle differ most between two motions, and the joints there in the other
+/// one.
 template <class Middle>
 Joints most_apart(const Work& w, const Middle& usual, const Middle& other) {
   const Kinematics kinematics(w.cell);
@@ -137,7 +141,8 @@ Joints most_apart(const Work& w, const Middle& usual, const Middle& other) {
 }
 
 /// The middle of a move by these interpolations, the table late by this.
-std::function<Joints(const Joints&, const Joints&)> middle_of(const CellDescription& cell, Interpolation interpolation,
+std::function<Joints(const Joints&, const Joints&)> middle_of(const CellDescription& cell,
+                                                              Interpolation interpolation,
                                                               double table_late_s) {
   return [&cell, interpolation, table_late_s](const Joints& from, const Joints& to) {
     Joints now = to;
@@ -165,11 +170,13 @@ void screen_on_the_path_of_a_late_table(Work& w) {
 }
 
 const Spoiling kSpoilings[] = {
-    {"DotTwice", "more than once", [](Work& w) { w.exposure(kVictim).dot_index = w.exposure(kVictim + 1).dot_index; }},
+    {"DotTwice", "more than once",
+     [](Work& w) { w.exposure(kVictim).dot_index = w.exposure(kVictim + 1).dot_index; }},
     {"DotMissing", "neither exposed nor skipped",
      [](Work& w) {
        w.plan.program.exposures.pop_back();
-       w.plan.program.vias.back().before_exposure = static_cast<std::uint32_t>(w.plan.program.exposures.size());
+       w.plan.program.vias.back().before_exposure =
+           static_cast<std::uint32_t>(w.plan.program.exposures.size());
        for (auto& via : w.plan.program.vias)
          via.before_exposure = std::min(via.before_exposure, w.plan.program.vias.back().before_exposure);
      }},
@@ -246,7 +253,8 @@ const Spoiling kSpoilings[] = {
        w.add_screen(tool.beam_O, tool.focus_O - .5 * (w.cell.lens.near_m + w.cell.lens.far_m) * tool.beam_O);
      }},
     {"ScreenOnAStraightPath", "on the path there, the lens body touches", &screen_on_the_straight_path},
-    {"ScreenOnThePathOfALateTable", "on the path there, the lens body touches", &screen_on_the_path_of_a_late_table},
+    {"ScreenOnThePathOfALateTable", "on the path there, the lens body touches",
+     &screen_on_the_path_of_a_late_table},
     {"RetractsRemoved", "without a retract",
      [](Work& w) {
        // Every re-pose goes straight there.

@@ -19,7 +19,8 @@ std::vector<PathDot> random_plate(std::size_t count, unsigned seed) {
   std::vector<PathDot> path(count);
   for (PathDot& dot : path) {
     dot.position_O = {uniform(random), uniform(random), 0};
-    dot.arm = {4 * dot.position_O.x(), 4 * dot.position_O.y(), .1F, -4 * (dot.position_O.x() + dot.position_O.y())};
+    dot.arm = {4 * dot.position_O.x(), 4 * dot.position_O.y(), .1F,
+               -4 * (dot.position_O.x() + dot.position_O.y())};
   }
   std::sort(path.begin(), path.end(), [](const PathDot& a, const PathDot& b) {  // strips, back and forth
     const int strip_a = static_cast<int>(a.position_O.y() / 3e-3F);
@@ -30,7 +31,8 @@ std::vector<PathDot> random_plate(std::size_t count, unsigned seed) {
   return path;
 }
 
-double path_s(const CellDescription& cell, const std::vector<PathDot>& path, const std::vector<std::uint32_t>& order) {
+double path_s(const CellDescription& cell, const std::vector<PathDot>& path,
+              const std::vector<std::uint32_t>& order) {
   const StepCost cost(cell);
   double sum = 0;
   for (std::size_t i = 1; i < order.size(); ++i)
@@ -69,8 +71,9 @@ TEST(Ordering, VisitsEveryDotOnceAndTakesLessTime) {
 }
 
 TEST(Ordering, LengthOfATourOverRandomDotsIsNearTheOptimum) {
-  // With time proportional to distance (no ticks, no ramps, one speed) the path is the plane's shortest tour, known to
-  // be .7124 sqrt(n A) for many dots; 2-opt and Or-opt alone are 5 to 10 per cent above, kicks take half of that off.
+  // With time proportional to distance (no ticks, no ramps, one speed) the path is the plane's shortest tour,
+  // known to be .7124 sqrt(n A) for many dots; 2-opt and Or-opt alone are 5 to 10 per cent above, kicks take
+  // half of that off.
   CellDescription cell = default_cell();
   cell.timing.tick_s = 0;
   cell.timing.settle_min_s = cell.timing.settle_max_s = 0;
@@ -80,8 +83,9 @@ TEST(Ordering, LengthOfATourOverRandomDotsIsNearTheOptimum) {
   }
   const std::size_t count = 8000;
   auto path = random_plate(count, 9);
-  // The slowest of two axes is the larger of two coordinates. Turned by an eighth of a turn, that is half the sum of
-  // their magnitudes in any other frame: a metric too, but not Euclid's; its constant lies within a factor of sqrt 2.
+  // The slowest of two axes is the larger of two coordinates. Turned by an eighth of a turn, that is half the
+  // sum of their magnitudes in any other frame: a metric too, but not Euclid's; its constant lies within a
+  // factor of sqrt 2.
   for (PathDot& dot : path) dot.arm = {dot.position_O.x(), dot.position_O.y(), 0, 0};
   const double unit_s = std::sqrt(static_cast<double>(count) * .03 * .03) / 1e-3;
   const double plain = path_s(cell, path, improved_order(cell, path, 0)) / unit_s;

@@ -82,7 +82,8 @@ TEST(PoseSearch, TheBaselineMeetsDotsHeadOnWhereItCan) {
   ASSERT_EQ(plan.program.exposures.size(), dots.dots.size());
   const Kinematics kinematics(cell);
   for (const Exposure& exposure : plan.program.exposures) {
-    const Eigen::Vector3d normal_O = dots.dots[exposure.dot_index].smooth_normal_O.cast<double>().normalized();
+    const Eigen::Vector3d normal_O =
+        dots.dots[exposure.dot_index].smooth_normal_O.cast<double>().normalized();
     EXPECT_LT((kinematics.tool_pose(exposure.joints).beam_O + normal_O).norm(), 1e-6);
   }
 }
@@ -106,7 +107,8 @@ TEST(PoseSearch, PreferredIncidenceIsKeptWhereItCanBe) {
     for (const Exposure& exposure : plan.program.exposures) {
       const Dot& dot = cup.dots.dots[exposure.dot_index];
       const Eigen::Vector3d normal_O = dot.smooth_normal_O.cast<double>().normalized();
-      const double from_smooth = std::acos(std::min(1., -kinematics.tool_pose(exposure.joints).beam_O.dot(normal_O)));
+      const double from_smooth =
+          std::acos(std::min(1., -kinematics.tool_pose(exposure.joints).beam_O.dot(normal_O)));
       if (from_smooth <= std::max(options.preferred_incidence, 5 * kDegree) + 1e-6) continue;
       // Only where the search for a single pose, which prefers small angles, finds none within it either.
       const auto pose = reach.find_pose(target_of(dot), home_joints(cup.cell)).pose;
@@ -126,9 +128,10 @@ TEST(PoseSearch, SameBytesForAnyNumberOfThreads) {
     ASSERT_EQ(single.program.exposures.size(), many.program.exposures.size());
     ASSERT_EQ(single.program.vias.size(), many.program.vias.size());
     for (std::size_t i = 0; i < many.program.exposures.size(); ++i) {
-      ASSERT_EQ(single.program.exposures[i].dot_index, many.program.exposures[i].dot_index) << "exposure " << i;
-      ASSERT_EQ(std::memcmp(single.program.exposures[i].joints.data(), many.program.exposures[i].joints.data(),
-                            sizeof(Joints)),
+      ASSERT_EQ(single.program.exposures[i].dot_index, many.program.exposures[i].dot_index)
+          << "exposure " << i;
+      ASSERT_EQ(std::memcmp(single.program.exposures[i].joints.data(),
+                            many.program.exposures[i].joints.data(), sizeof(Joints)),
                 0)
           << "exposure " << i;
     }
@@ -170,7 +173,8 @@ TEST(PoseSearch, J4AndCStayWithinTheirTurns) {
   const Plan plan = plan_exposures(Reach(cup.mesh, cell, {}), cup.dots);
   for (const auto& fault : check_program(plan.program, plan.skipped, cup.dots, cup.mesh, cell, {}))
     ADD_FAILURE() << "exposure " << fault.exposure << ": " << fault.what;
-  EXPECT_GT(static_cast<double>(plan.program.exposures.size()), .95 * static_cast<double>(cup.dots.dots.size()));
+  EXPECT_GT(static_cast<double>(plan.program.exposures.size()),
+            .95 * static_cast<double>(cup.dots.dots.size()));
 }
 
 }  // namespace

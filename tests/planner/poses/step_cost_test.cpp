@@ -68,7 +68,8 @@ TEST(StepCost, WithATurnIsTheLeastOverTurnsAndSymmetric) {
     EXPECT_EQ(turned_s, cost.with_turn(arm_of(to), arm_of(from), to_rate, from_rate)) << "step " << n;
     const float plain_s = cost(arm_of(from), arm_of(to));
     EXPECT_LE(turned_s, plain_s);
-    // Asked whether it costs less than so much, it says what it costs if it does, else no less than that and no more.
+    // Asked whether it costs less than so much, it says what it costs if it does, else no less than that and
+    // no more.
     for (const float enough_s : {.5F * turned_s, .99F * turned_s, 1.01F * turned_s, 2 * turned_s}) {
       const float told_s = cost.with_turn(arm_of(from), arm_of(to), from_rate, to_rate, 1, enough_s);
       if (turned_s < enough_s)

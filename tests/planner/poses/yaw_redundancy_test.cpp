@@ -62,7 +62,8 @@ struct Rows {
 double path_s(const CellDescription& cell, const std::vector<Joints>& path) {
   const StepCost cost(cell);
   double sum = 0;
-  for (std::size_t i = 1; i < path.size(); ++i) sum += static_cast<double>(cost(arm_of(path[i - 1]), arm_of(path[i])));
+  for (std::size_t i = 1; i < path.size(); ++i)
+    sum += static_cast<double>(cost(arm_of(path[i - 1]), arm_of(path[i])));
   return sum;
 }
 
@@ -116,7 +117,9 @@ TEST(YawRedundancy, LongToursAreWalkedInBlocksWithoutASeam) {
   EXPECT_LE(path_s(rows.cell, after), path_s(rows.cell, before));
   for (std::size_t i = 1; i < after.size(); ++i)
     if (i % once.size() != 0) {
-      EXPECT_LT(std::abs(reach.kinematics().yaw(after[i]) - reach.kinematics().yaw(after[i - 1])), 1 * kDegree) << i;
+      EXPECT_LT(std::abs(reach.kinematics().yaw(after[i]) - reach.kinematics().yaw(after[i - 1])),
+                1 * kDegree)
+          << i;
     }
 }
 

@@ -61,8 +61,8 @@ class Reference {
     joints[kTilt] = table.tilt;
     joints[kRotation] = table.rotation;
     return kinematics.limit_excess(joints).is_inside() &&
-           !bundle_.quill_touches(kinematics.tool_pose(joints), wider_m) && check_.body_fault(joints).empty() &&
-           check_.beam_fault(check_.X_OF(joints), 1e-5).empty();
+           !bundle_.quill_touches(kinematics.tool_pose(joints), wider_m) &&
+           check_.body_fault(joints).empty() && check_.beam_fault(check_.X_OF(joints), 1e-5).empty();
   }
 
   const Reach& reach_;

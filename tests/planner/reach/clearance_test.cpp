@@ -60,7 +60,8 @@ TEST(Clearance, FieldAgreesWithABundleOfRays) {
       const bool touches = reference.lens_touches(tool.focus_O, beam_O) || reference.quill_touches(tool);
       touching += touches;
       misses += is_clear && touches;
-      cautious += !is_clear && !touches && !reference.lens_touches(tool.focus_O, beam_O, Clearance::kMarginM) &&
+      cautious += !is_clear && !touches &&
+                  !reference.lens_touches(tool.focus_O, beam_O, Clearance::kMarginM) &&
                   !reference.quill_touches(tool, Clearance::kMarginM);
     }
   }
@@ -77,7 +78,8 @@ TEST(Clearance, ThePostCountsHoweverWideItIs) {
   const Clearance clearance(ball(.005), cell);
   const auto quill_over = [&](double x, double z) {
     const Vector3d beam_O(1, 0, 0);
-    return clearance.quill_obstruction({Vector3d(x, 0, z) + cell.arm.flange_to_focus_m * beam_O, beam_O, {0, 0, 1}});
+    return clearance.quill_obstruction(
+        {Vector3d(x, 0, z) + cell.arm.flange_to_focus_m * beam_O, beam_O, {0, 0, 1}});
   };
   EXPECT_EQ(quill_over(.058, -.002), Obstruction::kQuillTable);
   EXPECT_EQ(quill_over(.058, .03), Obstruction::kNone);
@@ -92,8 +94,8 @@ Joints any_joints(const CellDescription& cell, std::mt19937& random) {
   return joints;
 }
 
-/// Both codes see the same links: where planning keeps its margin, the check finds nothing, and where the check finds
-/// a link touching, planning does.
+/// Both codes see the same links: where planning keeps its margin, the check finds nothing, and where the
+/// check finds a link touching, planning does.
 TEST(Clearance, LinksAgreeWithTheIndependentCheck) {
   constexpr unsigned kSeed = 42;
   CellDescription cell = default_cell();

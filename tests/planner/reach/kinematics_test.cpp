@@ -46,7 +46,8 @@ TEST(Kinematics, InverseOfForwardIsTheSamePose) {
     const TablePose table = kinematics.table_pose(joints[kTilt], joints[kRotation]);
     for (const Elbow elbow : {Elbow::kPositive, Elbow::kNegative}) {
       Joints found = joints;
-      ASSERT_TRUE(kinematics.solve_arm(table.to_W(tool.focus_O), kinematics.yaw(joints), elbow, found)) << "pose " << n;
+      ASSERT_TRUE(kinematics.solve_arm(table.to_W(tool.focus_O), kinematics.yaw(joints), elbow, found))
+          << "pose " << n;
       const ToolPose again = kinematics.tool_pose(found);
       worst_m = std::max(worst_m, (again.focus_O - tool.focus_O).norm());
       worst_rad = std::max(worst_rad, (again.beam_O - tool.beam_O).norm());
@@ -87,7 +88,8 @@ TEST(Kinematics, RatesOverYawAreThoseOfTheInverse) {
 }
 
 TEST(Kinematics, InverseOfTheWholeChainIsTheSameBeamOnTheSameDot) {
-  // Only dot, beam and tilt are given: rotation, yaw and the arm are solved for, two ways and with both elbows.
+  // Only dot, beam and tilt are given: rotation, yaw and the arm are solved for, two ways and with both
+  // elbows.
   const CellDescription cell = default_cell();
   const Kinematics kinematics(cell);
   constexpr unsigned kSeed = 17;
@@ -138,7 +140,8 @@ TEST(Kinematics, KnownPoses) {
   const ToolPose tool = kinematics.tool_pose(joints);
   const TablePose upright = kinematics.table_pose(0, 0);
   const double leg = cell.arm.flange_to_focus_m / std::sqrt(2.);
-  EXPECT_LT((upright.to_W(tool.focus_O) - Eigen::Vector3d(cell.arm.upper_arm_m + cell.arm.forearm_m + leg, 0, .2 - leg))
+  EXPECT_LT((upright.to_W(tool.focus_O) -
+             Eigen::Vector3d(cell.arm.upper_arm_m + cell.arm.forearm_m + leg, 0, .2 - leg))
                 .norm(),
             1e-12);
   // A tilt of 90 degrees brings the object's top towards the robot.
@@ -156,7 +159,8 @@ TEST(Kinematics, TableSolutionsPointTheBeam) {
   std::normal_distribution<double> normal;
   std::size_t solved = 0;
   for (int n = 0; n < 20'000; ++n) {
-    const Eigen::Vector3d beam_O = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+    const Eigen::Vector3d beam_O =
+        Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
     const double tilt = .02 + 1.7 * std::abs(std::remainder(normal(random), 1));
     const TableSolutions solutions = solve_table(kinematics, tilt, beam_O);
     solved += solutions.size();
@@ -199,7 +203,8 @@ TEST(Kinematics, WindingStaysNearAndInsideTheLimits) {
       ASSERT_NEAR(std::remainder(unwrapped - a, kTurn), 0, 1e-9);
       ASSERT_LE(unwrapped, kinematics.axis_max(axis));
       ASSERT_GE(unwrapped, kinematics.axis_min(axis));
-      const double inside = std::clamp(near, kinematics.axis_min(axis) + kPi, kinematics.axis_max(axis) - kPi);
+      const double inside =
+          std::clamp(near, kinematics.axis_min(axis) + kPi, kinematics.axis_max(axis) - kPi);
       if (inside == near) {
         ASSERT_LE(std::abs(unwrapped - near), kPi + 1e-9);
       }

@@ -5,8 +5,8 @@
 #include "planner/reach/reach.h"
 #include "sampling/base/angles.h"
 
-/// Brute force: every pose of a grid over tilt, rotation and yaw with either elbow, checked by the same rules as
-/// planning's but found by another method. Confirms that dots which reach skips are out of reach.
+/// Brute force: every pose of a grid over tilt, rotation and yaw with either elbow, checked by the same rules
+/// as planning's but found by another method. Confirms that dots which reach skips are out of reach.
 namespace hilbrush {
 
 struct PoseGridAnswer {
@@ -24,8 +24,8 @@ inline PoseGridAnswer search_pose_grid(const Reach& reach, const Target& target,
   for (int a = 0; a <= tilts; ++a)
     for (int c = 0; c < turns; ++c) {
       const double rotation = std::remainder(c * kTurn / turns, kTurn);
-      const TablePose table = kinematics.table_pose(low + (high - low) * a / tilts,
-                                                    kinematics.unwrap_near(kRotation, rotation, reference[kRotation]));
+      const TablePose table = kinematics.table_pose(
+          low + (high - low) * a / tilts, kinematics.unwrap_near(kRotation, rotation, reference[kRotation]));
       for (int y = 0; y < turns; ++y) {
         const double yaw = y * kTurn / turns;
         const Eigen::Vector3d beam_O = table.R_WO.transpose() * kinematics.beam_W(yaw);

@@ -7,8 +7,8 @@
 #include "planner/reach/kinematics.h"
 #include "planner/reach/object_rays.h"
 
-/// The reference for clearance: bodies as dense bundles of rays against the object, and as dense points against post
-/// and plate. Slow and without any margin.
+/// The reference for clearance: bodies as dense bundles of rays against the object, and as dense points
+/// against post and plate. Slow and without any margin.
 namespace hilbrush {
 
 class RayBundle {
@@ -17,15 +17,16 @@ class RayBundle {
 
   bool lens_touches(const Eigen::Vector3d& focus_O, const Eigen::Vector3d& beam_O, double wider_m = 0) const {
     const auto& lens = cell_.lens;
-    return touches(focus_O - (lens.near_m - wider_m) * beam_O, -beam_O, lens.far_m - lens.near_m + 2 * wider_m,
-                   lens.radius_m + wider_m);
+    return touches(focus_O - (lens.near_m - wider_m) * beam_O, -beam_O,
+                   lens.far_m - lens.near_m + 2 * wider_m, lens.radius_m + wider_m);
   }
   bool quill_touches(const ToolPose& tool, double wider_m = 0) const {
-    return touches(tool.focus_O - cell_.arm.flange_to_focus_m * tool.beam_O, tool.up_O, cell_.arm.quill_length_m,
-                   cell_.arm.quill_radius_m + wider_m);
+    return touches(tool.focus_O - cell_.arm.flange_to_focus_m * tool.beam_O, tool.up_O,
+                   cell_.arm.quill_length_m, cell_.arm.quill_radius_m + wider_m);
   }
   /// A solid cylinder.
-  bool touches(const Eigen::Vector3d& from_O, const Eigen::Vector3d& axis_O, double length_m, double radius_m) const {
+  bool touches(const Eigen::Vector3d& from_O, const Eigen::Vector3d& axis_O, double length_m,
+               double radius_m) const {
     const Eigen::Vector3d u = axis_O.unitOrthogonal(), v = axis_O.cross(u);
     const auto around = [&](int i, int count) -> Eigen::Vector3d {
       const double angle = 2 * std::numbers::pi * i / count;
@@ -44,7 +45,8 @@ class RayBundle {
     for (int k = 0; k <= kSlices; ++k)  // diameters, for what comes in from the side
       for (int i = 0; i < 2 * kDiameters; i += 2) {
         const Eigen::Vector3d side_O = around(i, 4 * kDiameters);
-        if (rays_.is_blocked(from_O + (length_m * k / kSlices) * axis_O - radius_m * side_O, side_O, 0, 2 * radius_m))
+        if (rays_.is_blocked(from_O + (length_m * k / kSlices) * axis_O - radius_m * side_O, side_O, 0,
+                             2 * radius_m))
           return true;
       }
     return false;

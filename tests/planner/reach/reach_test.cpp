@@ -48,8 +48,8 @@ TEST(Reach, ADotUnderThePostIsBlockedByTheTable) {
 TEST(Reach, AHoleIsSeenAsDeepAsTheConeAllows) {
   const CellDescription cell = default_cell();
   const Reach reach(drilled_block(), cell, {});
-  // At 45 degrees the beam clears the opposite rim, 8 mm across, from less than 8 mm below it. Facets take a little of
-  // that.
+  // At 45 degrees the beam clears the opposite rim, 8 mm across, from less than 8 mm below it. Facets take a
+  // little of that.
   const double top_m = .04;
   const double radius_m = .004 * std::cos(std::numbers::pi / 96);
   for (const double depth_m : {.001, .004, .007})
@@ -193,7 +193,8 @@ TEST(ObjectDistance, IsTheDistanceToABall) {
     const double expected_m = (p - center).norm() - radius_m;
     if (expected_m < .005) continue;
     const double facets_m = radius_m * (1 - std::cos(std::numbers::pi / 24));  // the ball is a polyhedron
-    EXPECT_LE(distance(p), std::min(range_m, expected_m + facets_m) + distance.error_m(expected_m)) << p.transpose();
+    EXPECT_LE(distance(p), std::min(range_m, expected_m + facets_m) + distance.error_m(expected_m))
+        << p.transpose();
     EXPECT_GE(distance(p), std::min(range_m, expected_m) - 5e-4) << p.transpose();
   }
 }

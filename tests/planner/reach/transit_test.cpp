@@ -110,8 +110,8 @@ TEST(Transit, TheSearchFindsWhatSimpleWaysMiss) {
   EXPECT_GT(searched, 5U);
 }
 
-/// What one controller may do and another may not: moves that are clear in an unknown cell are clear in every cell, and
-/// some are clear only in a cell that is known.
+/// What one controller may do and another may not: moves that are clear in an unknown cell are clear in every
+/// cell, and some are clear only in a cell that is known.
 TEST(Transit, AnUnknownInterpolationIsClearUnderAll) {
   const TexturedMesh mesh = ball(.03);
   CellDescription cell = default_cell();
@@ -121,8 +121,10 @@ TEST(Transit, AnUnknownInterpolationIsClearUnderAll) {
   const Reach unknown(mesh, cell, {});
   std::vector<std::pair<Joints, Joints>> moves;
   for (int n = 0; n < 300; ++n) {
-    const auto from = unknown.find_pose(target_of(dots.dots[random() % dots.dots.size()]), home_joints(cell)).pose;
-    const auto to = unknown.find_pose(target_of(dots.dots[random() % dots.dots.size()]), home_joints(cell)).pose;
+    const auto from =
+        unknown.find_pose(target_of(dots.dots[random() % dots.dots.size()]), home_joints(cell)).pose;
+    const auto to =
+        unknown.find_pose(target_of(dots.dots[random() % dots.dots.size()]), home_joints(cell)).pose;
     if (from && to) moves.emplace_back(from->joints, to->joints);
   }
   std::size_t clear_unknown = 0;

@@ -8,7 +8,8 @@ namespace hilbrush {
 namespace {
 
 TEST(Random, SplitMix64GivesThePublishedNumbers) {
-  // The first outputs for seed 1234567, as the reference implementation (https://prng.di.unimi.it/splitmix64.c) gives.
+  // The first outputs for seed 1234567, as the reference implementation
+  // (https://prng.di.unimi.it/splitmix64.c) gives.
   constexpr std::uint64_t kExpected[] = {6457827717110365317u, 3203168211198807973u, 9817491932198370423u,
                                          4593380528125082431u, 16408922859458223821u};
   std::uint64_t state = 1234567;

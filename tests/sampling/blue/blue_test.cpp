@@ -56,7 +56,8 @@ TEST(Blue, HasBlueNoiseInThePlane) {
   EXPECT_GE(rival.below_half, .3) << "the control";
   EXPECT_LE(spectrum.anisotropy, rival.anisotropy + .1);
   EXPECT_GE(plane_spacing(blue).smallest, .5);
-  // Centers on the border and in the corners count here, where a stratum has only one side to keep its dot from.
+  // Centers on the border and in the corners count here, where a stratum has only one side to keep its dot
+  // from.
   EXPECT_LE(plane_largest_hole(blue), 1.1);
   EXPECT_LT(plane_discrepancies(blue)[1].rms, plane_discrepancies(jittered)[1].rms);
 }
@@ -136,8 +137,9 @@ TEST(Blue, SameBytesForAnyNumberOfThreads) {
     results.push_back(picture.place(options_for(5'000)));
   }
   for (std::size_t i = 0; i < results[0].dots.size(); ++i)
-    ASSERT_EQ(
-        std::memcmp(results[0].dots[i].position_O.data(), results[1].dots[i].position_O.data(), 3 * sizeof(double)), 0)
+    ASSERT_EQ(std::memcmp(results[0].dots[i].position_O.data(), results[1].dots[i].position_O.data(),
+                          3 * sizeof(double)),
+              0)
         << "dot " << i;
 }
 
@@ -155,8 +157,8 @@ TEST(Blue, CountsAndReportsAsTheOthersDo) {
   EXPECT_LT(report.path_constant, 1.4 * report_of_centroid.path_constant);
 
   EXPECT_EQ(picture.place(options_for(1)).dots.size(), 1u);
-  EXPECT_NEAR(picture.place(options_for(500)).pitch_m, picture.place(options_for(500, Sampler::kCentroid)).pitch_m,
-              1e-9);
+  EXPECT_NEAR(picture.place(options_for(500)).pitch_m,
+              picture.place(options_for(500, Sampler::kCentroid)).pitch_m, 1e-9);
 }
 
 TEST(Blue, NothingToPaintIsNoError) {

@@ -24,7 +24,8 @@ struct Source {
 double energy(const std::vector<Source>& sources, const Vector3d& place_O) {
   double sum = 0;
   for (const Source& source : sources) {
-    const double u = 1 - (place_O - source.position_O).squaredNorm() / static_cast<double>(source.kernel.support2);
+    const double u =
+        1 - (place_O - source.position_O).squaredNorm() / static_cast<double>(source.kernel.support2);
     if (u > 0) sum += source.factor * static_cast<double>(source.kernel.weight) * std::pow(u, 6);
   }
   return sum;

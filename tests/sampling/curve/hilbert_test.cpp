@@ -52,7 +52,8 @@ std::vector<Place> expect_curve(int depth) {
 
 TEST(Hilbert, EachQuadOnceAndNeighborsAdjacent) {
   for (int depth = 1; depth <= 6; ++depth)
-    EXPECT_EQ(expect_curve<HilbertQuad>(depth).back(), (Place{(1 << depth) - 1, 0, 0})) << "squares in a row join";
+    EXPECT_EQ(expect_curve<HilbertQuad>(depth).back(), (Place{(1 << depth) - 1, 0, 0}))
+        << "squares in a row join";
 }
 
 TEST(Hilbert, EachCubeOnceAndNeighborsAdjacent) {

@@ -20,7 +20,8 @@ double mirrored(std::uint64_t k) {
 using Definition = std::function<double(std::uint64_t index, std::uint64_t count)>;
 
 void expect_ranked(Sampler sampler, const Definition& definition) {
-  for (const std::uint64_t count : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 27u, 28u, 29u, 100u, 156u, 157u, 1000u, 4096u, 5555u}) {
+  for (const std::uint64_t count :
+       {1u, 2u, 3u, 4u, 5u, 7u, 8u, 27u, 28u, 29u, 100u, 156u, 157u, 1000u, 4096u, 5555u}) {
     std::vector<double> sorted;
     for (std::uint64_t i = 0; i < count; ++i) sorted.push_back(definition(i, count));
     std::sort(sorted.begin(), sorted.end());
@@ -56,7 +57,8 @@ TEST(Sequence, NiederreiterStartsOneEarlier) {
 /// Every half, quarter ... of the interval has its share, give or take two: what "low discrepancy" buys.
 TEST(Sequence, LowDiscrepancyFillsEveryDyadicInterval) {
   const std::uint64_t count = 100'000;
-  for (const Sampler sampler : {Sampler::kHalton, Sampler::kHammersley, Sampler::kSobol, Sampler::kNiederreiter}) {
+  for (const Sampler sampler :
+       {Sampler::kHalton, Sampler::kHammersley, Sampler::kSobol, Sampler::kNiederreiter}) {
     const Sequence sequence(sampler, count, 1);
     std::vector<int> of_interval(64);
     double last = -1;
@@ -76,7 +78,8 @@ TEST(Sequence, RisesForEverySamplerAndSeed) {
     for (const std::uint64_t seed : {1u, 2u, 77u}) {
       const Sequence sequence(sampler, 3001, seed);
       for (std::uint64_t i = 1; i < 3001; ++i)
-        ASSERT_LE(sequence.at(i - 1), sequence.at(i)) << "sampler " << static_cast<int>(sampler) << " seed " << seed;
+        ASSERT_LE(sequence.at(i - 1), sequence.at(i))
+            << "sampler " << static_cast<int>(sampler) << " seed " << seed;
       EXPECT_GE(sequence.at(0), 0);
       EXPECT_LT(sequence.at(3000), 1);
     }

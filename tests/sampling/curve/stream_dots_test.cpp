@@ -39,8 +39,8 @@ double largest_jump(const DotSequence& sequence) {
   return largest / sequence.pitch_m;
 }
 
-/// Distance from each dot to the nearest other one, in pitches, sorted. The order along the curve makes a simple search
-/// by x enough.
+/// Distance from each dot to the nearest other one, in pitches, sorted. The order along the curve makes a
+/// simple search by x enough.
 std::vector<double> nearest_distances(const DotSequence& sequence) {
   std::vector<Vector3d> p;
   for (const Dot& dot : sequence.dots) p.push_back(dot.position_O);
@@ -50,7 +50,8 @@ std::vector<double> nearest_distances(const DotSequence& sequence) {
     double best = 1e300;
     for (std::size_t j = i + 1; j < p.size() && p[j].x() - p[i].x() < best; ++j)
       best = std::min(best, (p[j] - p[i]).norm());
-    for (std::size_t j = i; j-- > 0 && p[i].x() - p[j].x() < best;) best = std::min(best, (p[j] - p[i]).norm());
+    for (std::size_t j = i; j-- > 0 && p[i].x() - p[j].x() < best;)
+      best = std::min(best, (p[j] - p[i]).norm());
     distances.push_back(best / sequence.pitch_m);
   }
   std::sort(distances.begin(), distances.end());
@@ -93,17 +94,19 @@ TEST(Sample, ExactCountsOnEveryAwkwardMeshWithEverySampler) {
           ASSERT_NEAR(dot.smooth_normal_O.norm(), 1, 1e-5) << name;
           ASSERT_LT(dot.triangle, mesh.triangle_count());
           const Vector3d offset = dot.position_O - mesh.corner(dot.triangle, 0);
-          ASSERT_NEAR(offset.dot(mesh.area_vector(dot.triangle).normalized()), 0, 1e-9) << name << ": off the surface";
+          ASSERT_NEAR(offset.dot(mesh.area_vector(dot.triangle).normalized()), 0, 1e-9)
+              << name << ": off the surface";
           ASSERT_LT(dot.component, curve.components().size());
         }
       }
   }
 }
 
-/// A ramp from white to black: bilinear between texels it is linear, so that the mass of any polygon has a closed form.
+/// A ramp from white to black: bilinear between texels it is linear, so that the mass of any polygon has a
+/// closed form.
 TexturedMesh ramp() {
-  TexturedMesh mesh =
-      test::with_texture(test::rectangle(.04, .04, 3, 3), 64, 4, [](int i, int) { return 1 - (i + .5) / 64; });
+  TexturedMesh mesh = test::with_texture(test::rectangle(.04, .04, 3, 3), 64, 4,
+                                         [](int i, int) { return 1 - (i + .5) / 64; });
   for (auto& corners : mesh.corner_uv)
     for (Eigen::Vector2d& uv : corners) uv = Eigen::Vector2d(.05 + .9 * uv.x(), uv.y());
   return mesh;
@@ -114,9 +117,11 @@ double worst_stratum_error(const CurveMass& mass, std::uint64_t count,
                            const std::function<double(const PatchPiece&)>& exact) {
   const double dot_mass = mass.total_m2() / static_cast<double>(count);
   std::vector<double> masses(count);
-  visit_stretches(mass, sample_options(count), [&](std::uint64_t stratum, const Patch& patch, double from, double to) {
-    for (const PatchPiece& piece : patch.pieces) masses.at(stratum) += (to - from) * exact(piece);
-  });
+  visit_stretches(mass, sample_options(count),
+                  [&](std::uint64_t stratum, const Patch& patch, double from, double to) {
+                    for (const PatchPiece& piece : patch.pieces)
+                      masses.at(stratum) += (to - from) * exact(piece);
+                  });
   double worst = 0;
   for (const double stratum : masses) worst = std::max(worst, std::abs(stratum / dot_mass - 1));
   return worst;
@@ -151,7 +156,8 @@ TEST(Sample, EveryStratumHasItsMassWhateverTheMesh) {
   for (const CurveKind kind : {CurveKind::kHilbert, CurveKind::kPeano2})
     for (const auto& [name, awkward] : test::awkward_meshes())
       for (const bool is_textured : {false, true}) {
-        const TexturedMesh mesh = repair_mesh(is_textured ? test::with_texture(awkward, 64, 64, texel) : awkward).mesh;
+        const TexturedMesh mesh =
+            repair_mesh(is_textured ? test::with_texture(awkward, 64, 64, texel) : awkward).mesh;
         const SurfaceCurve curve(mesh, kind);
         const ToneField tone(mesh, {});
         const CurveMass mass(curve, tone);
@@ -166,10 +172,12 @@ TEST(Sample, EveryStratumHasItsMassWhateverTheMesh) {
 
 /// Large flat areas and fine lines.
 TexturedMesh line_drawing() {
-  const auto is_line = [](int i, int j) { return (i > 170 && i < 174) || j == 512 || j == 513 || std::abs(i - j) < 2; };
+  const auto is_line = [](int i, int j) {
+    return (i > 170 && i < 174) || j == 512 || j == 513 || std::abs(i - j) < 2;
+  };
   return test::with_texture(
-      test::rectangle(.05, .05, 4, 4), 1024, 1024, [&](int i, int j) { return is_line(i, j) ? .05 : .6; }, false,
-      false);
+      test::rectangle(.05, .05, 4, 4), 1024, 1024, [&](int i, int j) { return is_line(i, j) ? .05 : .6; },
+      false, false);
 }
 
 TEST(Sample, AdaptivePatchesAreFewAndPlaceTheSameDots) {
@@ -218,7 +226,8 @@ TEST(Sample, DotsFollowTheTone) {
   const TexturedMesh mesh = ramp();
   const DotSequence sequence = sample(mesh, sample_options(20000));
   std::array<double, 10> counts{};
-  for (const Dot& dot : sequence.dots) counts[static_cast<std::size_t>(std::min(9., dot.position_O.x() / .004))] += 1;
+  for (const Dot& dot : sequence.dots)
+    counts[static_cast<std::size_t>(std::min(9., dot.position_O.x() / .004))] += 1;
   for (std::size_t k = 0; k < 10; ++k) {
     const double tone = .05 + .9 * (static_cast<double>(k) + .5) / 10;
     EXPECT_NEAR(counts[k] / 20000, tone / 5, .002) << k;
@@ -230,7 +239,8 @@ TEST(Sample, PitchAndCountSayTheSame) {
   SampleOptions options;
   options.pitch_m = .000254;
   const DotSequence by_pitch = sample(mesh, options);
-  EXPECT_EQ(by_pitch.dots.size(), static_cast<std::size_t>(std::lround(mesh.area_m2() / (.000254 * .000254))));
+  EXPECT_EQ(by_pitch.dots.size(),
+            static_cast<std::size_t>(std::lround(mesh.area_m2() / (.000254 * .000254))));
   EXPECT_NEAR(sample(mesh, sample_options(by_pitch.dots.size())).pitch_m, .000254, 1e-8);
 }
 

@@ -50,7 +50,8 @@ TEST(SquareMap, HasNoFlippedFaceAndFillsTheSquare) {
         area += .5 * cross(u, v);
         const FaceSource& source = cut->disk.sources()[f];
         if (source.triangle == kNoTriangle) continue;
-        const Eigen::Vector2d p = source.corners[1] - source.corners[0], q = source.corners[2] - source.corners[0];
+        const Eigen::Vector2d p = source.corners[1] - source.corners[0],
+                              q = source.corners[2] - source.corners[0];
         surface += cross(p, q) * mesh.area_vector(source.triangle).norm();
       }
       EXPECT_NEAR(area, map->square_count, 1e-9 * map->square_count);
@@ -82,8 +83,8 @@ TEST(SquareMap, GivesAStripItsSquaresInARow) {
 }
 
 TEST(SquareMap, IsAllButConformalOnASlitBlob) {
-  // Whatever its length: the boundary of a sphere's slit is placed as it should be, and where that does not fit,
-  // corners are moved until the map is a whole number of squares.
+  // Whatever its length: the boundary of a sphere's slit is placed as it should be, and where that does not
+  // fit, corners are moved until the map is a whole number of squares.
   for (const double length : {1., 1.3, 1.7, 2.2, 3.}) {
     TexturedMesh mesh = test::sphere(.02, 96, 64);
     for (auto& vertex : mesh.vertices) vertex.z() *= length;

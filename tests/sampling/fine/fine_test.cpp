@@ -40,8 +40,8 @@ struct Sheet {
     return options;
   }
 
-  /// Mean square of painted minus wanted, both blurred by `sigma` pitches; by brute force on a grid of its own, a third
-  /// of a pitch wide, without the border.
+  /// Mean square of painted minus wanted, both blurred by `sigma` pitches; by brute force on a grid of its
+  /// own, a third of a pitch wide, without the border.
   double error(const DotSequence& sequence, double sigma) const {
     constexpr int kSide = 48 * 3;
     std::vector<double> difference(kSide * kSide);
@@ -89,7 +89,8 @@ TEST(Fine, GainsThreeDecibels) {
   const Sheet sheet;
   const DotSequence fine = refine_dots(sheet.curve, sheet.tone, sheet.dots, sheet.spot);
   EXPECT_GE(10 * std::log10(sheet.error(sheet.dots, 1) / sheet.error(fine, 1)), 3);
-  EXPECT_GE(10 * std::log10(sheet.error(sheet.dots, 2) / sheet.error(fine, 2)), 1) << "the coarser picture gains too";
+  EXPECT_GE(10 * std::log10(sheet.error(sheet.dots, 2) / sheet.error(fine, 2)), 1)
+      << "the coarser picture gains too";
 }
 
 TEST(Fine, KeepsCountOrderAndSurface) {
@@ -121,8 +122,9 @@ TEST(Fine, SameBytesForAnyNumberOfThreads) {
     results.push_back(refine_dots(sheet.curve, sheet.tone, sheet.dots, sheet.spot, {5}));
   }
   for (std::size_t i = 0; i < results[0].dots.size(); ++i)
-    ASSERT_EQ(
-        std::memcmp(results[0].dots[i].position_O.data(), results[1].dots[i].position_O.data(), 3 * sizeof(double)), 0)
+    ASSERT_EQ(std::memcmp(results[0].dots[i].position_O.data(), results[1].dots[i].position_O.data(),
+                          3 * sizeof(double)),
+              0)
         << "dot " << i;
 }
 
@@ -130,7 +132,8 @@ TEST(Fine, FewPassesDoNoHarm) {
   const Sheet sheet;
   const double before = sheet.error(sheet.dots, 1);
   for (const int passes : {1, 2, 4})
-    EXPECT_LE(sheet.error(refine_dots(sheet.curve, sheet.tone, sheet.dots, sheet.spot, {passes}), 1), 1.02 * before)
+    EXPECT_LE(sheet.error(refine_dots(sheet.curve, sheet.tone, sheet.dots, sheet.spot, {passes}), 1),
+              1.02 * before)
         << passes << " passes";
 }
 

@@ -42,7 +42,8 @@ template <class Visit>
 void probe(const TexturedMesh& mesh, double length_m, Visit visit) {
   for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
     double longest = 0;
-    for (int c = 0; c < 3; ++c) longest = std::max(longest, (mesh.corner(t, c) - mesh.corner(t, (c + 1) % 3)).norm());
+    for (int c = 0; c < 3; ++c)
+      longest = std::max(longest, (mesh.corner(t, c) - mesh.corner(t, (c + 1) % 3)).norm());
     const int parts = static_cast<int>(std::ceil(longest / length_m));
     for (int i = 0; i < parts; ++i)
       for (int j = 0; i + j < parts; ++j)
@@ -90,8 +91,8 @@ TEST(FillHoles, FindsAHoleThatWasCut) {
   EXPECT_GT(largest_gap_m(mesh, dots.dots, pitch), 5 * pitch);
   const DotSequence filled = fill_holes(curve, tone, dots, 1.1);
   EXPECT_LE(largest_gap_m(mesh, filled.dots, pitch), 1.1 * pitch);
-  // At least A / (2.6 r^2) discs of radius r are needed to cover an area A; with centers at least r apart, at most
-  // A / (.87 r^2) fit.
+  // At least A / (2.6 r^2) discs of radius r are needed to cover an area A; with centers at least r apart, at
+  // most A / (.87 r^2) fit.
   const double area = test::kPi * 36;
   EXPECT_GT(static_cast<double>(filled.dots.size() - left), area / 2.6 / 1.21 * .8);
   EXPECT_LT(static_cast<double>(filled.dots.size() - left), area / .87 / 1.21);
@@ -162,11 +163,14 @@ TEST(FillHoles, WhiteAndNoiseGetNothing) {
       plain, 64, 1, [](int i, int) { return i < 32 ? 0. : 1.; }, false, false);
   const ToneField half_tone(half, {});
   const SurfaceCurve curve(half);
-  for (const Dot& dot : fill_holes(curve, half_tone, place(curve, half_tone, 1000, Sampler::kJittered), .9).dots)
+  for (const Dot& dot :
+       fill_holes(curve, half_tone, place(curve, half_tone, 1000, Sampler::kJittered), .9).dots)
     EXPECT_LT(dot.position_O.x(), .026);
-  // A tenth of the texels black, each a third of a pitch: the picture is a light gray, not black points to be filled.
+  // A tenth of the texels black, each a third of a pitch: the picture is a light gray, not black points to be
+  // filled.
   const TexturedMesh noise = test::with_texture(
-      plain, 200, 200, [](int i, int j) { return (i * 7 + j * 13 + i * j % 5) % 10 == 0 ? 0. : 1.; }, false, false);
+      plain, 200, 200, [](int i, int j) { return (i * 7 + j * 13 + i * j % 5) % 10 == 0 ? 0. : 1.; }, false,
+      false);
   const ToneField noise_tone(noise, {});
   const SurfaceCurve noise_curve(noise);
   FillReport report;

@@ -14,7 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// 3 x 2: red, green, blue above white, black, mid gray.
-const std::vector<std::uint8_t> kPixels{255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255, 0, 0, 0, 128, 128, 128};
+const std::vector<std::uint8_t> kPixels{255, 0,   0,   0, 255, 0, 0,   0,   255,
+                                        255, 255, 255, 0, 0,   0, 128, 128, 128};
 
 template <class Value>
 fs::path save(const ModelOnDisk& disk, const std::string& name, int width, int height, int channels,
@@ -70,7 +71,8 @@ TEST(ImageFile, KeepsChannelsAlphaAndSixteenBits) {
       save<std::uint16_t>(disk, "deep.png", 1, 1, 3, {32768, 32768, 32768}, OIIO::TypeDesc::UINT16), 1000);
   ASSERT_TRUE(texture) << texture.reason();
   EXPECT_NEAR(texture->luminance[0], .2140, 1e-3);
-  texture = load_image_file(save<float>(disk, "linear.tif", 1, 1, 3, {.5f, .5f, .5f}, OIIO::TypeDesc::FLOAT), 1000);
+  texture =
+      load_image_file(save<float>(disk, "linear.tif", 1, 1, 3, {.5f, .5f, .5f}, OIIO::TypeDesc::FLOAT), 1000);
   ASSERT_TRUE(texture) << texture.reason();
   EXPECT_NEAR(texture->luminance[0], .5, 1e-6) << "a picture in floating point is linear already";
 }
@@ -97,12 +99,14 @@ TEST(ImageFile, RefusesMorePixelsThanAllowed) {
 TEST(ImageFile, RefusesTruncatedFiles) {
   const ModelOnDisk disk;
   std::vector<std::uint8_t> noise(64 * 64 * 3);
-  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint8_t>((i * 2654435761u) >> 13);
+  for (std::size_t i = 0; i < noise.size(); ++i)
+    noise[i] = static_cast<std::uint8_t>((i * 2654435761u) >> 13);
   for (const char* name : {"a.png", "a.jpg", "a.gif", "a.tga", "a.bmp", "a.tif"}) {
     const std::string bytes = bytes_of(save(disk, name, 64, 64, 3, noise));
     for (const double share : {.02, .3, .6, .9}) {
       const auto size = static_cast<std::size_t>(share * static_cast<double>(bytes.size()));
-      const auto texture = load_image_file(disk.write(std::string("cut_") + name, bytes.substr(0, size)), 1 << 20);
+      const auto texture =
+          load_image_file(disk.write(std::string("cut_") + name, bytes.substr(0, size)), 1 << 20);
       EXPECT_FALSE(texture) << name << " cut to " << share;
       EXPECT_FALSE(texture.reason().empty());
     }
@@ -137,8 +141,8 @@ std::string tiled_tiff(const ModelOnDisk& disk) {
   spec.tile_width = spec.tile_height = 16;
   spec.attribute("compression", "zip");
   const std::vector<std::uint8_t> gray(32 * 32, 128);
-  EXPECT_TRUE(output && output->open(file.string(), spec) && output->write_image(OIIO::TypeDesc::UINT8, gray.data()) &&
-              output->close());
+  EXPECT_TRUE(output && output->open(file.string(), spec) &&
+              output->write_image(OIIO::TypeDesc::UINT8, gray.data()) && output->close());
   return bytes_of(file);
 }
 
@@ -169,19 +173,22 @@ TEST(ImageFile, BelievesNoHeaderThatUnpacksAtOpening) {
   };
   // Run-length encoded, 40,000 pixels each way: OpenImageIO unpacks it when it opens it.
   std::string bmp = "BM" + little_endian(2000, 4) + little_endian(0, 4) + little_endian(54 + 1024, 4) +
-                    little_endian(40, 4) + little_endian(40000, 4) + little_endian(40000, 4) + little_endian(1, 2) +
-                    little_endian(8, 2) + little_endian(1, 4);
+                    little_endian(40, 4) + little_endian(40000, 4) + little_endian(40000, 4) +
+                    little_endian(1, 2) + little_endian(8, 2) + little_endian(1, 4);
   bmp.resize(2000, '\0');
-  EXPECT_NE(refusal("rle.bmp", bmp).find("it has 40000 x 40000 pixels"), std::string::npos) << refusal("rle.bmp", bmp);
+  EXPECT_NE(refusal("rle.bmp", bmp).find("it has 40000 x 40000 pixels"), std::string::npos)
+      << refusal("rle.bmp", bmp);
   const std::string upside_down = bmp.substr(0, 22) + little_endian(static_cast<std::uint32_t>(-40000), 4);
-  EXPECT_NE(refusal("rle.bmp", upside_down + bmp.substr(26)).find("it has 40000 x 40000 pixels"), std::string::npos);
+  EXPECT_NE(refusal("rle.bmp", upside_down + bmp.substr(26)).find("it has 40000 x 40000 pixels"),
+            std::string::npos);
   // A canvas of 2 x 2 with a frame of 65,535 x 65,535.
   const std::string gif = "GIF89a" + little_endian(2, 2) + little_endian(2, 2) + std::string("\x80\0\0", 3) +
-                          std::string(6, '\0') + std::string("\x21\xfe\2hi\0", 6) + "," + little_endian(0, 4) +
-                          little_endian(65535, 2) + little_endian(65535, 2) + std::string("\0\2\0;", 4);
+                          std::string(6, '\0') + std::string("\x21\xfe\2hi\0", 6) + "," +
+                          little_endian(0, 4) + little_endian(65535, 2) + little_endian(65535, 2) +
+                          std::string("\0\2\0;", 4);
   EXPECT_NE(refusal("frame.gif", gif).find("it has 65535 x 65535 pixels"), std::string::npos);
-  std::string tga =
-      std::string("\0\0\12\0\0\0\0\0\0\0\0\0", 12) + little_endian(65535, 2) + little_endian(65535, 2) + "\x18\x20";
+  std::string tga = std::string("\0\0\12\0\0\0\0\0\0\0\0\0", 12) + little_endian(65535, 2) +
+                    little_endian(65535, 2) + "\x18\x20";
   EXPECT_NE(refusal("rle.tga", tga).find("it has 65535 x 65535 pixels"), std::string::npos);
 }
 

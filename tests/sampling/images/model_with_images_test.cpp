@@ -56,19 +56,21 @@ TEST(ModelFile, RefusesWhatItCannotReadAndSaysWhatItIs) {
 TEST(ModelFile, NamesTheTexturesItTried) {
   const ModelOnDisk disk;
   const Model model = disk.load_vrml(
-      "Shape { appearance Appearance { texture ImageTexture { url [ \"a.png\" \"../b.png\" ] } } geometry Box { } }");
-  EXPECT_TRUE(
-      warns(model, "model.wrl:2: the texture cannot be read (there is no such file); tried 'a.png', '../b.png'"));
+      "Shape { appearance Appearance { texture ImageTexture { url [ \"a.png\" \"../b.png\" ] } } geometry "
+      "Box { } }");
+  EXPECT_TRUE(warns(
+      model, "model.wrl:2: the texture cannot be read (there is no such file); tried 'a.png', '../b.png'"));
   EXPECT_EQ(model.mesh.materials[0].texture, -1);
 }
 
 TEST(ModelFile, FindsTexturesUnderTheEndOfAForeignPath) {
   const ModelOnDisk disk;
   disk.write("maps/a b.png", "x");
-  for (const char* url : {"maps/a b.png", "maps\\\\a b.png", "maps/a%20b.png", "C:\\\\work\\\\maps\\\\a b.png",
-                          "/elsewhere/maps/a b.png", "file:maps/a b.png"}) {
-    const Model model = disk.load_vrml(std::string("Shape { appearance Appearance { texture ImageTexture { url \"") +
-                                       url + "\" } } geometry Box { } }");
+  for (const char* url : {"maps/a b.png", "maps\\\\a b.png", "maps/a%20b.png",
+                          "C:\\\\work\\\\maps\\\\a b.png", "/elsewhere/maps/a b.png", "file:maps/a b.png"}) {
+    const Model model =
+        disk.load_vrml(std::string("Shape { appearance Appearance { texture ImageTexture { url \"") + url +
+                       "\" } } geometry Box { } }");
     EXPECT_EQ(model.mesh.textures.size(), 1u) << url;
     EXPECT_EQ(model.files.size(), 2u) << url;
   }
@@ -89,9 +91,10 @@ TEST(ModelFile, SharesTexturesAndCountsTheirPixels) {
   ModelLimits limits;
   limits.image_pixels = 5;
   load_model(
-      disk.write("m.wrl",
-                 "#VRML V2.0 utf8\n" + shape +
-                     "Shape { appearance Appearance { texture ImageTexture { url \"b.png\" } } geometry Box { } }"),
+      disk.write(
+          "m.wrl",
+          "#VRML V2.0 utf8\n" + shape +
+              "Shape { appearance Appearance { texture ImageTexture { url \"b.png\" } } geometry Box { } }"),
       reader, limits);
   EXPECT_EQ(limits_seen, (std::vector<std::size_t>{5, 3}));
 }
@@ -102,7 +105,8 @@ class RealModels : public testing::Test {
   void SetUp() override {
     const char* folder = std::getenv("HILBRUSH_TEST_MODELS");
     if (!folder || !fs::is_directory(folder))
-      GTEST_SKIP() << "HILBRUSH_TEST_MODELS does not name the folder of test models: real models are not tested";
+      GTEST_SKIP()
+          << "HILBRUSH_TEST_MODELS does not name the folder of test models: real models are not tested";
     folder_ = folder;
   }
   Model load(const std::string& name) const { return load_model(folder_ / name, load_image_file); }

@@ -28,7 +28,8 @@ TEST(GrowingBall, OnAPlateTrianglesAreAsFarAsTheyLook) {
     const Vector3d center = position(mesh, {start, {.3, .3, .4}});
     ball.begin(center, start);
     for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
-      EXPECT_NEAR(std::sqrt(ball.entry2(t, kFarAway)), distance_to(mesh, t, center), 1e-12) << start << " to " << t;
+      EXPECT_NEAR(std::sqrt(ball.entry2(t, kFarAway)), distance_to(mesh, t, center), 1e-12)
+          << start << " to " << t;
   }
 }
 
@@ -40,7 +41,8 @@ TEST(GrowingBall, TheOtherSideOfAFoldIsAsFarAsTheFold) {
   // The fourth row from the fold, in the middle of the sheet; straight up is the other half, 2 mm away.
   for (std::uint32_t start = 0; start < mesh.triangle_count(); ++start) {
     const Vector3d center = position(mesh, {start, {.3, .3, .4}});
-    if (center.z() > 0 || std::abs(center.y() - side / 2) > .1 * side || std::abs(center.x() - .4 * side) > .1 * side)
+    if (center.z() > 0 || std::abs(center.y() - side / 2) > .1 * side ||
+        std::abs(center.x() - .4 * side) > .1 * side)
       continue;
     ball.begin(center, start);
     for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {

@@ -21,7 +21,8 @@ std::size_t count_of(const RepairedMesh& repaired, const std::string& what) {
 
 double volume(const TexturedMesh& mesh) {
   double sum = 0;
-  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) sum += mesh.area_vector(t).dot(mesh.corner(t, 0)) / 3;
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
+    sum += mesh.area_vector(t).dot(mesh.corner(t, 0)) / 3;
   return sum;
 }
 
@@ -95,9 +96,10 @@ TEST(MeshRepair, OrientsClosedPartsOutwardsAndOpenOnesByMajority) {
     EXPECT_GT(repaired.mesh.area_vector(t).z(), 0);
     // The corners' uv went with them: here uv is the position itself.
     for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(
-          (repaired.mesh.corner_uv[t][static_cast<std::size_t>(c)] * .05 - repaired.mesh.corner(t, c).head<2>()).norm(),
-          0, 1e-12);
+      EXPECT_NEAR((repaired.mesh.corner_uv[t][static_cast<std::size_t>(c)] * .05 -
+                   repaired.mesh.corner(t, c).head<2>())
+                      .norm(),
+                  0, 1e-12);
   }
 }
 
@@ -135,9 +137,12 @@ TEST(MeshRepair, TurnsAlmostClosedPartsOutwards) {
 }
 
 TEST(MeshRepair, LeavesWhatMayShowItsInsideOnPurpose) {
-  const auto is_turned = [](TexturedMesh mesh) { return count_of(repair_mesh(std::move(mesh)), kTurned) > 0; };
+  const auto is_turned = [](TexturedMesh mesh) {
+    return count_of(repair_mesh(std::move(mesh)), kTurned) > 0;
+  };
   EXPECT_FALSE(is_turned(inside_out_sphere([](const Eigen::Vector3d& p) { return p.z() > 0; }))) << "a bowl";
-  EXPECT_FALSE(is_turned(inside_out_sphere([](const Eigen::Vector3d& p) { return p.z() > .5; }))) << "a deep bowl";
+  EXPECT_FALSE(is_turned(inside_out_sphere([](const Eigen::Vector3d& p) { return p.z() > .5; })))
+      << "a deep bowl";
   EXPECT_FALSE(is_turned(test::rectangle(.05, .05, 4, 4)));
   EXPECT_FALSE(is_turned(test::folded_sheet(.05, 1, 4, 4)));
 }
@@ -157,8 +162,8 @@ TEST(MeshRepair, WeldsVerticesThatDifferByRounding) {
   TexturedMesh step = test::rectangle(.05, .05, 4, 4);
   const std::size_t vertices = step.vertices.size();
   step.vertices.emplace_back(.05, .05, 5e-9);
-  step.triangles.push_back({static_cast<std::uint32_t>(vertices) - 1, static_cast<std::uint32_t>(vertices) - 2,
-                            static_cast<std::uint32_t>(vertices)});
+  step.triangles.push_back({static_cast<std::uint32_t>(vertices) - 1,
+                            static_cast<std::uint32_t>(vertices) - 2, static_cast<std::uint32_t>(vertices)});
   EXPECT_EQ(repair_mesh(test::finish(step)).mesh.vertices.size(), vertices + 1);
 }
 

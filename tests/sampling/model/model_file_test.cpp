@@ -61,8 +61,9 @@ TEST(ModelFile, LimitsItsFilesTogether) {
     disk.write(name, kBox + std::string(9'000, ' '));
     inlines += "Inline { url \"" + name + "\" }\n";
   }
-  EXPECT_NE(disk.refusal("model.wrl", inlines, limits).find("together are larger than the limit of 40000 bytes"),
-            std::string::npos);
+  EXPECT_NE(
+      disk.refusal("model.wrl", inlines, limits).find("together are larger than the limit of 40000 bytes"),
+      std::string::npos);
 }
 
 TEST(ModelFile, ReadsAnImageOnceWhateverItIsCalled) {
@@ -91,9 +92,10 @@ TEST(ModelFile, ReadsAnImageOnceWhateverItIsCalled) {
   EXPECT_EQ(model.mesh.textures.size(), 1u);
   reads = 0;
   load_model(
-      disk.write("m.ply", ply + "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement "
-                                "face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 "
-                                "0\n3 0 1 2\n"),
+      disk.write("m.ply",
+                 ply + "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement "
+                       "face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 "
+                       "0\n3 0 1 2\n"),
       reader);
   EXPECT_EQ(reads, 1);
 }
@@ -113,19 +115,21 @@ TEST(ModelFile, RefusesWhatItCannotReadAndSaysWhatItIs) {
 TEST(ModelFile, NamesTheTexturesItTried) {
   const ModelOnDisk disk;
   const Model model = disk.load_vrml(
-      "Shape { appearance Appearance { texture ImageTexture { url [ \"a.png\" \"../b.png\" ] } } geometry Box { } }");
-  EXPECT_TRUE(
-      warns(model, "model.wrl:2: the texture cannot be read (there is no such file); tried 'a.png', '../b.png'"));
+      "Shape { appearance Appearance { texture ImageTexture { url [ \"a.png\" \"../b.png\" ] } } geometry "
+      "Box { } }");
+  EXPECT_TRUE(warns(
+      model, "model.wrl:2: the texture cannot be read (there is no such file); tried 'a.png', '../b.png'"));
   EXPECT_EQ(model.mesh.materials[0].texture, -1);
 }
 
 TEST(ModelFile, FindsTexturesUnderTheEndOfAForeignPath) {
   const ModelOnDisk disk;
   disk.write("maps/a b.png", "x");
-  for (const char* url : {"maps/a b.png", "maps\\\\a b.png", "maps/a%20b.png", "C:\\\\work\\\\maps\\\\a b.png",
-                          "/elsewhere/maps/a b.png", "file:maps/a b.png"}) {
-    const Model model = disk.load_vrml(std::string("Shape { appearance Appearance { texture ImageTexture { url \"") +
-                                       url + "\" } } geometry Box { } }");
+  for (const char* url : {"maps/a b.png", "maps\\\\a b.png", "maps/a%20b.png",
+                          "C:\\\\work\\\\maps\\\\a b.png", "/elsewhere/maps/a b.png", "file:maps/a b.png"}) {
+    const Model model =
+        disk.load_vrml(std::string("Shape { appearance Appearance { texture ImageTexture { url \"") + url +
+                       "\" } } geometry Box { } }");
     EXPECT_EQ(model.mesh.textures.size(), 1u) << url;
     EXPECT_EQ(model.files.size(), 2u) << url;
   }
@@ -146,9 +150,10 @@ TEST(ModelFile, SharesTexturesAndCountsTheirPixels) {
   ModelLimits limits;
   limits.image_pixels = 5;
   load_model(
-      disk.write("m.wrl",
-                 "#VRML V2.0 utf8\n" + shape +
-                     "Shape { appearance Appearance { texture ImageTexture { url \"b.png\" } } geometry Box { } }"),
+      disk.write(
+          "m.wrl",
+          "#VRML V2.0 utf8\n" + shape +
+              "Shape { appearance Appearance { texture ImageTexture { url \"b.png\" } } geometry Box { } }"),
       reader, limits);
   EXPECT_EQ(limits_seen, (std::vector<std::size_t>{5, 3}));
 }
@@ -159,7 +164,8 @@ class RealModels : public testing::Test {
   void SetUp() override {
     const char* folder = std::getenv("HILBRUSH_TEST_MODELS");
     if (!folder || !fs::is_directory(folder))
-      GTEST_SKIP() << "HILBRUSH_TEST_MODELS does not name the folder of test models: real models are not tested";
+      GTEST_SKIP()
+          << "HILBRUSH_TEST_MODELS does not name the folder of test models: real models are not tested";
     folder_ = folder;
   }
   Model load(const std::string& name) const { return load_model(folder_ / name, load_image_file); }

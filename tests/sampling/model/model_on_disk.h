@@ -27,7 +27,8 @@ class ModelOnDisk {
     return load("model.wrl", "#VRML V2.0 utf8\n" + body, limits);
   }
   /// The message of the refusal, with file and line; empty if the model was read.
-  std::string refusal(const std::string& name, const std::string& bytes, const ModelLimits& limits = {}) const {
+  std::string refusal(const std::string& name, const std::string& bytes,
+                      const ModelLimits& limits = {}) const {
     try {
       load(name, bytes, limits);
     } catch (const InputError& error) {
@@ -80,7 +81,8 @@ inline Eigen::Vector2d uv_at(const TexturedMesh& mesh, const Eigen::Vector3d& po
     const Eigen::Vector3d normal = mesh.area_vector(t);
     Eigen::Vector3d b;
     for (int c = 0; c < 3; ++c)
-      b[c] = .5 * (mesh.corner(t, (c + 1) % 3) - point).cross(mesh.corner(t, (c + 2) % 3) - point).dot(normal) /
+      b[c] = .5 *
+             (mesh.corner(t, (c + 1) % 3) - point).cross(mesh.corner(t, (c + 2) % 3) - point).dot(normal) /
              normal.squaredNorm();
     const double distance =
         std::abs((point - mesh.corner(t, 0)).dot(normal.normalized())) + 10 * std::max(0., -b.minCoeff());

@@ -8,7 +8,8 @@ namespace {
 const ToneCurve kCurve{{0, .3, .8, 1}, {0, .2, .9, 2}};
 
 TEST(ToneCurve, InverseGivesTheWantedToneBack) {
-  for (const double wanted : {0., .1, .3, .55, .8, .9, 1.}) EXPECT_NEAR(kCurve.inverse(kCurve(wanted)), wanted, 1e-15);
+  for (const double wanted : {0., .1, .3, .55, .8, .9, 1.})
+    EXPECT_NEAR(kCurve.inverse(kCurve(wanted)), wanted, 1e-15);
 }
 
 TEST(ToneCurve, InverseEndsWhereTheCurveEnds) {

@@ -57,8 +57,10 @@ TEST(ParametricSurface, DerivativesAreThoseOfThePosition) {
 }
 
 TEST(ParametricSurface, CurvaturesInClosedForm) {
-  const auto sphere = make_surface(ParametricShape::kSphere), saddle = make_surface(ParametricShape::kMonkeySaddle),
-             plane = make_surface(ParametricShape::kPlane), umbrella = make_surface(ParametricShape::kWhitneyUmbrella);
+  const auto sphere = make_surface(ParametricShape::kSphere),
+             saddle = make_surface(ParametricShape::kMonkeySaddle),
+             plane = make_surface(ParametricShape::kPlane),
+             umbrella = make_surface(ParametricShape::kWhitneyUmbrella);
   for (double x = .05; x < 1; x += .09)
     for (double y = .04; y < 1; y += .07) {
       const Vector2d uv(x, y);
@@ -95,7 +97,8 @@ TEST(ParametricSurface, NormalsAreUnitEvenAtPolesAndPinches) {
   for (const ParametricShape shape : all_shapes())
     for (double x = 0; x <= 1; x += .125)
       for (double y = 0; y <= 1; y += .125)
-        EXPECT_NEAR(make_surface(shape)->normal({x, y}).norm(), 1, 1e-12) << name_of(shape) << " at " << x << " " << y;
+        EXPECT_NEAR(make_surface(shape)->normal({x, y}).norm(), 1, 1e-12)
+            << name_of(shape) << " at " << x << " " << y;
 }
 
 TEST(MeasureParametric, MethodsBAndCAgreeWithTheTrueArea) {
@@ -110,7 +113,8 @@ TEST(MeasureParametric, MethodsBAndCAgreeWithTheTrueArea) {
       EXPECT_NEAR(areas.by_method[1], area, 1e-4 * area) << name_of(shape);
       EXPECT_NEAR(areas.by_method[2], area, 1e-4 * area) << name_of(shape);
     }
-  // The reparameterized super-ellipsoid is measured by (c) as well as by (b), the plain one is not: section 4.5.
+  // The reparameterized super-ellipsoid is measured by (c) as well as by (b), the plain one is not:
+  // section 4.5.
   options.curve = CurveKind::kHilbert;
   const ParametricAreas smooth =
       measure_parametric(*make_surface(ParametricShape::kSuperEllipsoidReparameterized), options);
@@ -119,8 +123,8 @@ TEST(MeasureParametric, MethodsBAndCAgreeWithTheTrueArea) {
   EXPECT_GT(plain.by_method[1] - plain.by_method[2], .01 * plain.by_method[1]);
 }
 
-/// A triangle over three vertices is half a leaf where the curve turns and nothing where it runs straight: in the limit
-/// two fifths of the area on the Hilbert curve.
+/// A triangle over three vertices is half a leaf where the curve turns and nothing where it runs straight: in
+/// the limit two fifths of the area on the Hilbert curve.
 TEST(MeasureParametric, TrianglesSeeTheTurnsOfTheCurve) {
   ParametricOptions options;
   options.minimum_depth = options.maximum_depth = 6;
@@ -129,8 +133,9 @@ TEST(MeasureParametric, TrianglesSeeTheTurnsOfTheCurve) {
 
 TEST(SampleParametric, CountIsExactForEverySamplerCurveAreaAndShape) {
   for (const ParametricShape shape : all_shapes())
-    for (const Sampler sampler : {Sampler::kCentroid, Sampler::kJittered, Sampler::kEven, Sampler::kRandom,
-                                  Sampler::kHalton, Sampler::kHammersley, Sampler::kSobol, Sampler::kNiederreiter})
+    for (const Sampler sampler :
+         {Sampler::kCentroid, Sampler::kJittered, Sampler::kEven, Sampler::kRandom, Sampler::kHalton,
+          Sampler::kHammersley, Sampler::kSobol, Sampler::kNiederreiter})
       for (const CurveKind curve : {CurveKind::kHilbert, CurveKind::kPeano2}) {
         ParametricOptions options;
         options.dot_count = 777;
@@ -154,7 +159,8 @@ TEST(SampleParametric, SphereGetsDotsByItsArea) {
   ParametricOptions options;
   options.dot_count = 20'000;
   for (const Sampler sampler : {Sampler::kJittered, Sampler::kCentroid, Sampler::kHalton})
-    for (const AreaMethod method : {AreaMethod::kTriangle, AreaMethod::kSquare, AreaMethod::kFirstFundamentalForm}) {
+    for (const AreaMethod method :
+         {AreaMethod::kTriangle, AreaMethod::kSquare, AreaMethod::kFirstFundamentalForm}) {
       options.sampler = sampler;
       options.area = method;
       const ParametricSamples samples = sample_parametric(*make_surface(ParametricShape::kSphere), options);
@@ -162,7 +168,8 @@ TEST(SampleParametric, SphereGetsDotsByItsArea) {
         double below = 0;
         for (const ParametricDot& dot : samples.dots) below += dot.position.z() < z;
         EXPECT_NEAR(below / 20'000, (z + 1) / 2, .004)
-            << "sampler " << static_cast<int>(sampler) << " area method " << static_cast<int>(method) << " z " << z;
+            << "sampler " << static_cast<int>(sampler) << " area method " << static_cast<int>(method) << " z "
+            << z;
       }
     }
 }
@@ -183,7 +190,8 @@ TEST(SampleParametric, DensitiesAreFollowed) {
     EXPECT_NEAR(share(ParametricDensity::kConstant, is_left), .5, .005);
     EXPECT_NEAR(share(ParametricDensity::kU, is_left), .25, .005);
     EXPECT_NEAR(share(ParametricDensity::kUPlusV, is_left), .375, .005);
-    EXPECT_NEAR(share(ParametricDensity::kUPlusV, [](const Vector2d& uv) { return uv.y() < .5; }), .375, .005);
+    EXPECT_NEAR(share(ParametricDensity::kUPlusV, [](const Vector2d& uv) { return uv.y() < .5; }), .375,
+                .005);
   }
   // Total curvature of the sphere is even over its area; on the monkey saddle it follows |K| dA.
   options.density = ParametricDensity::kGaussianCurvature;

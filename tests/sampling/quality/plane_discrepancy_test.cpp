@@ -16,7 +16,8 @@ using test::grid_points, test::random_directions, test::random_points;
 
 constexpr TestShapes kManyShapes{40'000, 3};
 
-/// One point in the middle: the shares of all shapes are 0 or 1, and the integrals over the shapes have closed forms.
+/// One point in the middle: the shares of all shapes are 0 or 1, and the integrals over the shapes have
+/// closed forms.
 TEST(PlaneDiscrepancy, OfOnePointIsItsClosedForm) {
   const std::vector<Vector2d> middle{{.5, .5}};
   const Discrepancy rectangles = plane_discrepancy(middle, PlaneShape::kRectangle, kManyShapes);
@@ -30,7 +31,8 @@ TEST(PlaneDiscrepancy, OfOnePointIsItsClosedForm) {
   EXPECT_NEAR(circles.largest, 1 - pi / 8, .001);
 
   // Triangles do not contain their own corner, so their error is their area.
-  const Discrepancy triangles = plane_discrepancy(std::vector<Vector2d>{{0, 0}}, PlaneShape::kTriangle, kManyShapes);
+  const Discrepancy triangles =
+      plane_discrepancy(std::vector<Vector2d>{{0, 0}}, PlaneShape::kTriangle, kManyShapes);
   EXPECT_NEAR(triangles.rms, std::sqrt((2. / 9 - 1. / 8) / 4), .003);
   EXPECT_LE(triangles.largest, .5);
 }

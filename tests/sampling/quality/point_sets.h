@@ -24,7 +24,8 @@ inline std::vector<Eigen::Vector2d> random_points(std::size_t count, unsigned se
 inline std::vector<Eigen::Vector2d> grid_points(int side) {
   std::vector<Eigen::Vector2d> points;
   for (int j = 0; j < side; ++j)
-    for (int i = 0; i < side; ++i) points.emplace_back(((j % 2 == 0 ? i : side - 1 - i) + .5) / side, (j + .5) / side);
+    for (int i = 0; i < side; ++i)
+      points.emplace_back(((j % 2 == 0 ? i : side - 1 - i) + .5) / side, (j + .5) / side);
   return points;
 }
 
@@ -49,7 +50,8 @@ inline std::vector<Eigen::Vector3d> random_directions(std::size_t count, unsigne
 inline std::vector<Eigen::Vector3d> spiral_directions(std::size_t count) {
   std::vector<Eigen::Vector3d> directions;
   for (std::size_t i = 0; i < count; ++i) {
-    const double z = (2 * static_cast<double>(i) + 1) / static_cast<double>(count) - 1, r = std::sqrt(1 - z * z);
+    const double z = (2 * static_cast<double>(i) + 1) / static_cast<double>(count) - 1,
+                 r = std::sqrt(1 - z * z);
     const double turn = 2 * std::numbers::pi * static_cast<double>(i) / std::numbers::phi;
     directions.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
   }

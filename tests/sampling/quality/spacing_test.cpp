@@ -11,7 +11,8 @@ namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-const double kGridSpacing = 1 / std::sqrt(2 / std::numbers::sqrt3);  ///< of a square grid over the densest packing
+const double kGridSpacing =
+    1 / std::sqrt(2 / std::numbers::sqrt3);  ///< of a square grid over the densest packing
 
 TEST(PlaneSpacing, OfAGridIsTheSameEverywhere) {
   const Spacing spacing = plane_spacing(test::grid_points(40));
@@ -49,7 +50,8 @@ TEST(PlaneHole, IsAsLargeAsAnyEmptyDisc) {
     for (int j = 0; j <= 100; ++j)
       for (int i = 0; i <= 100; ++i) {
         double nearest = 2;
-        for (const Vector2d& p : points) nearest = std::min(nearest, (p - Vector2d(i, j) / 100.).squaredNorm());
+        for (const Vector2d& p : points)
+          nearest = std::min(nearest, (p - Vector2d(i, j) / 100.).squaredNorm());
         best = std::max(best, std::sqrt(nearest));
       }
     const double hole = plane_largest_hole(points) / std::sqrt(500.);
@@ -61,9 +63,10 @@ TEST(PlaneHole, IsAsLargeAsAnyEmptyDisc) {
 TEST(SphereSpacing, OfAnOctahedronIsItsClosedForm) {
   const std::vector<Vector3d> corners{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   const double area_each = 4 * std::numbers::pi / 6;
-  EXPECT_NEAR(sphere_spacing(corners).smallest, std::numbers::sqrt2 / std::sqrt(2 * area_each / std::numbers::sqrt3),
-              1e-9);
-  EXPECT_NEAR(sphere_largest_hole(corners), std::sqrt(2 - 2 / std::numbers::sqrt3) / std::sqrt(area_each), 1e-3);
+  EXPECT_NEAR(sphere_spacing(corners).smallest,
+              std::numbers::sqrt2 / std::sqrt(2 * area_each / std::numbers::sqrt3), 1e-9);
+  EXPECT_NEAR(sphere_largest_hole(corners), std::sqrt(2 - 2 / std::numbers::sqrt3) / std::sqrt(area_each),
+              1e-3);
 }
 
 TEST(PathConstant, OfRowsIsOne) {
@@ -96,7 +99,8 @@ TEST(Coherence, OfRowsIsThatOfTheirDistance) {
     yy += along * along;
     xy += straight * along;
   }
-  const double expected = (xy / n - x * y / n / n) / std::sqrt((xx / n - x * x / n / n) * (yy / n - y * y / n / n));
+  const double expected =
+      (xy / n - x * y / n / n) / std::sqrt((xx / n - x * x / n / n) * (yy / n - y * y / n / n));
   const Coherence rows = spatial_coherence(PlaneCurve::kRows, 12, {20'000, 2});
   EXPECT_NEAR(rows.correlation, expected, .02);
   EXPECT_EQ(rows.pairs.size(), 20'000u);

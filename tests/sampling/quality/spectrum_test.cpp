@@ -26,7 +26,8 @@ TEST(PointTransform, IsTheSumOverThePoints) {
   for (int kx = 0; kx <= highest; ++kx)
     for (int ky = -highest; ky <= highest; ++ky) {
       std::complex<double> sum = 0;
-      for (const Vector2d& p : points) sum += std::polar(1., -2 * std::numbers::pi * (kx * p.x() + ky * p.y()));
+      for (const Vector2d& p : points)
+        sum += std::polar(1., -2 * std::numbers::pi * (kx * p.x() + ky * p.y()));
       worst = std::max(worst, std::abs(sum - transform.at(kx, ky)));
     }
   EXPECT_LT(worst, 1e-6 * std::sqrt(static_cast<double>(points.size())));
@@ -43,7 +44,8 @@ TEST(PlaneSpectrum, OfAGridIsEmptyButForItsPeaks) {
 
 TEST(PlaneSpectrum, OfWhiteNoiseIsOneEverywhere) {
   std::vector<Spectrum> spectra;
-  for (unsigned seed = 1; seed <= 8; ++seed) spectra.push_back(plane_spectrum(test::random_points(20'000, seed)));
+  for (unsigned seed = 1; seed <= 8; ++seed)
+    spectra.push_back(plane_spectrum(test::random_points(20'000, seed)));
   const Spectrum mean = average(spectra);
   EXPECT_NEAR(mean.below_half, 1, .05);
   EXPECT_NEAR(mean.below_quarter, 1, .1);
@@ -56,8 +58,8 @@ TEST(PlaneSpectrum, OfWhiteNoiseIsOneEverywhere) {
   EXPECT_LT(mean.anisotropy, .2);
 }
 
-/// One random point in each square of a grid: P(f) = 1 - |sinc(f_x) sinc(f_y)|^2, from the transform of a square. Its
-/// mean below half the principal frequency.
+/// One random point in each square of a grid: P(f) = 1 - |sinc(f_x) sinc(f_y)|^2, from the transform of a
+/// square. Its mean below half the principal frequency.
 double jitter_below_half() {
   const auto sinc2 = [](double f) {
     return std::abs(f) < 1e-9 ? 1 : std::pow(std::sin(std::numbers::pi * f) / (std::numbers::pi * f), 2);
@@ -74,7 +76,8 @@ double jitter_below_half() {
 
 TEST(PlaneSpectrum, OfJitterIsOneLessTheSquaresSpectrum) {
   std::vector<Spectrum> spectra;
-  for (unsigned seed = 1; seed <= 4; ++seed) spectra.push_back(plane_spectrum(test::jittered_points(150, seed)));
+  for (unsigned seed = 1; seed <= 4; ++seed)
+    spectra.push_back(plane_spectrum(test::jittered_points(150, seed)));
   const Spectrum mean = average(spectra);
   EXPECT_NEAR(mean.below_half, jitter_below_half(), .01);
 }
@@ -90,7 +93,8 @@ TEST(SurfaceSpectrum, OfRandomDotsIsOne) {
   const TexturedMesh mesh = test::sphere(.025, 60, 30);
   const Spectrum spectrum = SurfaceQuality(mesh).spectrum(test::random_dots(mesh, 20'000, 1));
   EXPECT_NEAR(spectrum.below_half, 1, .08);
-  for (const Spectrum::Ring& ring : spectrum.rings) EXPECT_NEAR(ring.power, 1, .12) << "at " << ring.frequency;
+  for (const Spectrum::Ring& ring : spectrum.rings)
+    EXPECT_NEAR(ring.power, 1, .12) << "at " << ring.frequency;
   EXPECT_TRUE(spectrum.directions.empty());
 }
 
@@ -105,8 +109,8 @@ TEST(SurfaceSpectrum, OfAGridOnAPlateIsEmptyBelow) {
   EXPECT_GT(spectrum.peak, 5);
 }
 
-/// The even density is subtracted with its own curvature, borders and tones, so that the low power of a spiral remains
-/// low.
+/// The even density is subtracted with its own curvature, borders and tones, so that the low power of a
+/// spiral remains low.
 TEST(SurfaceSpectrum, OfAnEvenSpiralOnASphereIsLowBelow) {
   const TexturedMesh mesh = test::sphere(.025, 96, 48);
   const SurfaceQuality quality(mesh);

@@ -37,8 +37,10 @@ TEST(DiscTriangleArea, OfTwoHalvesIsThatOfTheWhole) {
     for (Vector2d& v : p) v = 3 * (v - Vector2d(.5, .5));
     const double radius = p[3].norm(), t = .3;
     const Vector2d middle = (1 - t) * p[1] + t * p[2];
-    EXPECT_NEAR(disc_triangle_area(radius, p[0], p[1], p[2]),
-                disc_triangle_area(radius, p[0], p[1], middle) + disc_triangle_area(radius, p[0], middle, p[2]), 1e-12)
+    EXPECT_NEAR(
+        disc_triangle_area(radius, p[0], p[1], p[2]),
+        disc_triangle_area(radius, p[0], p[1], middle) + disc_triangle_area(radius, p[0], middle, p[2]),
+        1e-12)
         << "seed " << seed;
   }
 }
@@ -61,7 +63,8 @@ TEST(SurfaceQuality, ABallOnAPlateIsExact) {
   const SurfaceQuality quality(mesh);
   EXPECT_NEAR(quality.share_in_ball({.025, .02, 0}, .015), kPi * .015 * .015 / .0025, 1e-12);
   EXPECT_NEAR(quality.share_in_ball({.025, .02, .009}, .015), kPi * .012 * .012 / .0025, 1e-12);
-  EXPECT_NEAR(quality.share_in_ball({0, .02, 0}, .015), kPi * .015 * .015 / .005, 1e-12);  // half beyond the border
+  EXPECT_NEAR(quality.share_in_ball({0, .02, 0}, .015), kPi * .015 * .015 / .005,
+              1e-12);  // half beyond the border
 }
 
 TEST(SurfaceQuality, AToneIsCountedByItsMass) {
@@ -92,8 +95,8 @@ TEST(SurfaceQuality, RandomDotsHaveTheDiscrepancyOfCoins) {
   std::vector<std::vector<Dot>> dots;
   for (unsigned seed = 1; seed <= 16; ++seed) dots.push_back(test::random_dots(mesh, 1000, seed));
   Sets sets(dots.begin(), dots.end());
-  // Shares are uniform for triangle sets: E[p(1-p)] = 1/6. Radii of balls are uniform up to .866 of the diameter, the
-  // share is their square over that of the diameter.
+  // Shares are uniform for triangle sets: E[p(1-p)] = 1/6. Radii of balls are uniform up to .866 of the
+  // diameter, the share is their square over that of the diameter.
   double squares = 0, of_balls = 0;
   for (const Discrepancy& d : quality.triangle_sets(sets)) squares += d.rms * d.rms / 16;
   for (const Discrepancy& d : quality.balls(sets)) of_balls += d.rms * d.rms / 16;
@@ -130,14 +133,15 @@ TEST(SurfaceQuality, AGridOnAPlateHasItsHoleSpacingAndPath) {
 }
 
 TEST(SurfaceQuality, TheTwoSidesOfAThinPlateAreApart) {
-  // Two plates a tenth of a pitch apart, facing away from each other; dots on one are not neighbors of dots on
-  // the other.
+  // Two plates a tenth of a pitch apart, facing away from each other; dots on one are not neighbors of dots
+  // on the other.
   TexturedMesh back = test::rectangle(.05, .05, 2, 2);
   for (auto& triangle : back.triangles) std::swap(triangle[1], triangle[2]);
   const TexturedMesh mesh = test::both(test::rectangle(.05, .05, 2, 2), back, {0, 0, -.0002});
   const SurfaceQuality quality(mesh);
   std::vector<Dot> dots;
-  for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) dots.push_back(test::dot_at(mesh, {t, {.2, .4, .4}}));
+  for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t)
+    dots.push_back(test::dot_at(mesh, {t, {.2, .4, .4}}));
   EXPECT_GT(quality.spacing(dots).smallest, .2);
   const double both_sides = quality.largest_hole(dots);
   dots.erase(dots.begin(), dots.begin() + 7);  // one is left in front
@@ -145,17 +149,20 @@ TEST(SurfaceQuality, TheTwoSidesOfAThinPlateAreApart) {
 }
 
 TEST(SurfaceQuality, ADotBeyondASharpFoldIsNear) {
-  // One dot 5 mm from a fold of 6 degrees: the empty disc around a place on the other side reaches to it over the fold.
+  // One dot 5 mm from a fold of 6 degrees: the empty disc around a place on the other side reaches to it over
+  // the fold.
   const double side = .04, angle = .1;
   const TexturedMesh mesh = test::folded_sheet(side, angle, 8, 8);
   const SurfaceQuality quality(mesh);
   std::vector<Dot> dots{test::dot_at(mesh, quality.nearest({.005, side / 2, 0}))};
   const double far_corner = Vector3d(side * std::cos(angle) - .005, side / 2, side * std::sin(angle)).norm();
   const double pitch = std::sqrt(2 * side * side);
-  // From the far corners of both halves the ball reaches the fold only where it is as far as the dot is, or farther.
+  // From the far corners of both halves the ball reaches the fold only where it is as far as the dot is, or
+  // farther.
   EXPECT_NEAR(quality.largest_hole(dots) * pitch, std::max(far_corner, std::hypot(side, 0)), 1e-3 * side);
   // Facing dots 2 and 5 mm from the fold are as far apart as the farther one is from the fold.
-  dots.push_back(test::dot_at(mesh, quality.nearest({.002 * std::cos(angle), side / 2, .002 * std::sin(angle)})));
+  dots.push_back(
+      test::dot_at(mesh, quality.nearest({.002 * std::cos(angle), side / 2, .002 * std::sin(angle)})));
   const double densest = std::sqrt(2 / std::numbers::sqrt3 * mesh.area_m2() / 2);
   const Spacing spacing = quality.spacing(dots);
   EXPECT_NEAR(spacing.distances.back() * densest, .005, 1e-6);

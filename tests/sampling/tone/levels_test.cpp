@@ -14,7 +14,8 @@ namespace {
 const ToneCurve kCurve{{0, .3, .8, 1}, {0, .2, .9, 2}};
 
 double asked_energy(const ToneField& tone, double pitch_m) {
-  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
+  const std::array<Eigen::Vector2d, 3> whole{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0),
+                                             Eigen::Vector2d(0, 1)};
   double mass = 0;
   for (std::uint32_t t = 0; t < tone.mesh().triangle_count(); ++t) mass += tone.integrate(t, whole).mass;
   return mass / (pitch_m * pitch_m);
@@ -51,7 +52,8 @@ TEST(Levels, FlatToneHasOneLevelThroughout) {
 }
 
 TEST(Levels, EnergiesAddUpToWhatIsAsked) {
-  TexturedMesh mesh = test::rectangle(.02, .02, 8, 8);  // a ramp of grays over all levels, in steps and smooth
+  TexturedMesh mesh =
+      test::rectangle(.02, .02, 8, 8);  // a ramp of grays over all levels, in steps and smooth
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t)
     for (int c = 0; c < 3; ++c)
       mesh.corner_luminance[t][static_cast<std::size_t>(c)] =

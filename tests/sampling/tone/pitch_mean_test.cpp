@@ -45,7 +45,8 @@ std::vector<double> asked_at_random(const ToneField& tone, int count) {
   std::vector<double> asked;
   for (int k = 0; k < count; ++k) {
     const Vector2d b(uniform(random), uniform(random));
-    const auto triangle = static_cast<std::uint32_t>(static_cast<std::size_t>(k) % tone.mesh().triangle_count());
+    const auto triangle =
+        static_cast<std::uint32_t>(static_cast<std::size_t>(k) % tone.mesh().triangle_count());
     asked.push_back(tone.asked({triangle, {1 - b.sum(), b.x(), b.y()}}));
   }
   return asked;
@@ -76,7 +77,8 @@ TEST(PitchMean, WhatIsCoarserThanAPitchIsAskedForAsEver) {
   std::vector<double> tones(64);
   for (double& tone : tones) tone = uniform(random);
   // A texel is 12 pitches.
-  const TexturedMesh mesh = square(8, 1, 1, [&](int i, int j) { return tones[static_cast<std::size_t>(8 * j + i)]; });
+  const TexturedMesh mesh =
+      square(8, 1, 1, [&](int i, int j) { return tones[static_cast<std::size_t>(8 * j + i)]; });
   const ToneOptions by_texel = options_for(0), by_pitch = options_for(kSideM / 8 / 12);
   const auto before = asked_at_random(ToneField(mesh, by_texel), 400),
              now = asked_at_random(ToneField(mesh, by_pitch), 400);
@@ -107,7 +109,8 @@ TEST(PitchMean, TrianglesOfAllScalesAskForTheSame) {
 }
 
 TEST(PitchMean, NeverAsksForMoreThanFourTimesTheMean) {
-  // A black texel in the white, in grids of all sizes: the detail's Gaussian is four times as high as the mean's.
+  // A black texel in the white, in grids of all sizes: the detail's Gaussian is four times as high as the
+  // mean's.
   for (const double repeats : {.2, 1., 5., 40.}) {
     const TexturedMesh mesh = square(33, repeats, repeats, [](int i, int j) { return i == 16 && j == 16; });
     for (const double asked : asked_at_random(ToneField(mesh, options_for(.001)), 400)) {
@@ -144,7 +147,8 @@ TEST(PitchMean, DegenerateTrianglesDoNoHarm) {
     EXPECT_GE(integral.mass, 0);
     EXPECT_LE(integral.mass, 2.1 * integral.area_m2);
   }
-  EXPECT_NEAR(tone.integrate(first + 2, whole).mass / tone.integrate(first + 2, whole).area_m2, kBent(.5), .01);
+  EXPECT_NEAR(tone.integrate(first + 2, whole).mass / tone.integrate(first + 2, whole).area_m2, kBent(.5),
+              .01);
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ SurfacePoint at(std::uint32_t t, const Vector2d& b) {
 /// The integrals by 2 n^2 midpoints.
 ToneIntegral brute_force(const ToneField& tone, std::uint32_t t, const std::array<Vector2d, 3>& p, int n) {
   const Vector2d e1 = p[1] - p[0], e2 = p[2] - p[0];
-  const double area =
-      std::abs(e1.x() * e2.y() - e1.y() * e2.x()) * tone.mesh().area_vector(t).norm() / (static_cast<double>(n) * n);
+  const double area = std::abs(e1.x() * e2.y() - e1.y() * e2.x()) * tone.mesh().area_vector(t).norm() /
+                      (static_cast<double>(n) * n);
   ToneIntegral sum;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n - i; ++j)
@@ -67,7 +67,8 @@ TEST(ToneField, IntegralsOfTexturesAreExactHoweverTheyAreAddressed) {
     for (const bool repeat_v : {true, false})
       for (const double extent : {.3, 3., 9.}) {
         TexturedMesh mesh = test::with_texture(
-            test::rectangle(.05, .03, 2, 1), 23, 7, [&](int, int) { return uniform(random); }, repeat_u, repeat_v);
+            test::rectangle(.05, .03, 2, 1), 23, 7, [&](int, int) { return uniform(random); }, repeat_u,
+            repeat_v);
         // Anywhere, also negative, mirrored and beyond the picture.
         for (auto& corners : mesh.corner_uv)
           for (Vector2d& uv : corners) uv = extent * Vector2d(uniform(random) - .5, uniform(random) - .5);
@@ -80,7 +81,8 @@ TEST(ToneField, IntegralsOfTexturesAreExactHoweverTheyAreAddressed) {
 }
 
 TEST(ToneField, CollapsedTextureCoordinatesStillHaveATone) {
-  TexturedMesh mesh = test::with_texture(test::rectangle(.05, .05, 1, 1), 8, 8, [](int i, int) { return i / 7.; });
+  TexturedMesh mesh =
+      test::with_texture(test::rectangle(.05, .05, 1, 1), 8, 8, [](int i, int) { return i / 7.; });
   mesh.corner_uv[0].fill(Vector2d(.40625, .5));  // a point
   mesh.corner_uv[1] = {Vector2d(.1, .1), Vector2d(.5, .5), Vector2d(.9, .9)};
   const ToneField tone(mesh, {});
@@ -119,7 +121,8 @@ TEST(ToneField, MurrayDaviesAndTheToneCurve) {
 }
 
 TEST(ToneField, TheCurveBendsBetweenTexelsToo) {
-  // Black beside white: halfway the curve asks for much less than the mean of what it asks for black and white.
+  // Black beside white: halfway the curve asks for much less than the mean of what it asks for black and
+  // white.
   const TexturedMesh mesh = test::with_texture(
       test::rectangle(.01, .01, 1, 1), 4, 4, [](int i, int) { return i % 2; }, false, false);
   ToneOptions options;
@@ -135,7 +138,8 @@ TEST(ToneField, TheCurveBendsBetweenTexelsToo) {
 
 TEST(ToneField, OneChannelMultipliesThreeReplace) {
   for (const int channels : {1, 2, 3, 4}) {
-    TexturedMesh mesh = test::with_texture(test::rectangle(.01, .01, 1, 1), 4, 4, [](int, int) { return .5; });
+    TexturedMesh mesh =
+        test::with_texture(test::rectangle(.01, .01, 1, 1), 4, 4, [](int, int) { return .5; });
     for (auto& corners : mesh.corner_luminance) corners.fill(.5f);
     mesh.textures[0].channels = channels;
     const ToneField tone(mesh, {});

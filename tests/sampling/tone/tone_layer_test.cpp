@@ -34,8 +34,8 @@ TexelIntegral sum_of_parts(const ToneLayer& layer, const std::array<Vector2d, 4>
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) {
       const Vector2d low = square[0] + i * u + j * v;
-      const TexelIntegral part =
-          layer.integrate(std::array{low, Vector2d(low + u), Vector2d(low + u + v), Vector2d(low + v)}, addressing);
+      const TexelIntegral part = layer.integrate(
+          std::array{low, Vector2d(low + u), Vector2d(low + u + v), Vector2d(low + v)}, addressing);
       sum.mass += part.mass;
       sum.first += part.first;
       sum.square += part.square;
@@ -68,7 +68,8 @@ TEST(ToneLayer, EdgesOnTheLinesBetweenTexelsCountOnce) {
   std::mt19937 random(kSeed);
   const ToneLayer layer = noise(random, 16, 16);
   for (const int side : {1, 2, 5, 9}) {
-    const std::array square{Vector2d(3, 4), Vector2d(3 + side, 4), Vector2d(3 + side, 4 + side), Vector2d(3, 4 + side)};
+    const std::array square{Vector2d(3, 4), Vector2d(3 + side, 4), Vector2d(3 + side, 4 + side),
+                            Vector2d(3, 4 + side)};
     double mass = 0;
     for (int i = 0; i < side; ++i)
       for (int j = 0; j < side; ++j)

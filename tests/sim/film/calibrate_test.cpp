@@ -41,7 +41,8 @@ TEST(Calibrate, GrainThatMakesReadingsFallDoesNotMakeTheCurveFall) {
 
 TEST(Calibrate, PaintThatShowsNothingIsAnError) {
   EXPECT_THROW(calibrate_tone(closed_form([](double) { return 0.; }), 1), InputError);
-  EXPECT_THROW(calibrate_tone([](const std::vector<double>&) { return std::vector<WedgeStep>{}; }, 1), InputError);
+  EXPECT_THROW(calibrate_tone([](const std::vector<double>&) { return std::vector<WedgeStep>{}; }, 1),
+               InputError);
 }
 
 TEST(Calibrate, TheSimulatedWedgeReadsWhatIsWanted) {

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kPitch = .5e-3, kSide = .04, kMargin = .008;
 
-/// A square of one wanted tone under paint of linear response, evenly painted with `painted` by weak spots half a pitch
-/// apart.
+/// A square of one wanted tone under paint of linear response, evenly painted with `painted` by weak spots
+/// half a pitch apart.
 struct EvenPicture {
   EvenPicture(double wanted, double painted)
       : cell(linear_cell()),

@@ -18,8 +18,8 @@ using test::visit_surface;
 
 constexpr double kCellPitch = .254e-3;
 
-/// Joints whose beam has its focus at p_O and travels along direction_W's yaw, with the table level: solved here from
-/// the frame comment.
+/// Joints whose beam has its focus at p_O and travels along direction_W's yaw, with the table level: solved
+/// here from the frame comment.
 Joints joints_for(const CellDescription& cell, const Eigen::Vector3d& p_O, double yaw, double tilt = 0,
                   double rotation = 0) {
   const Eigen::AngleAxisd tilted(-tilt, Eigen::Vector3d::UnitY()), turned(rotation, Eigen::Vector3d::UnitZ());
@@ -34,7 +34,8 @@ Joints joints_for(const CellDescription& cell, const Eigen::Vector3d& p_O, doubl
   const double l2 = cell.arm.forearm_m;
   const double r = flange.head<2>().norm();
   const double elbow = std::acos((r * r - l1 * l1 - l2 * l2) / (2 * l1 * l2));
-  const double j1 = std::atan2(flange.y(), flange.x()) - std::atan2(l2 * std::sin(elbow), l1 + l2 * std::cos(elbow));
+  const double j1 =
+      std::atan2(flange.y(), flange.x()) - std::atan2(l2 * std::sin(elbow), l1 + l2 * std::cos(elbow));
   return {j1, elbow, flange.z(), yaw - j1 - elbow, tilt, rotation};
 }
 
@@ -49,8 +50,9 @@ Emission emission_at(const CellDescription& cell, const Eigen::Vector3d& p_O, do
 
 double total_energy(const Film& film, double step_m) {
   double energy = 0;
-  visit_surface(film.mesh(), step_m,
-                [&](const SurfacePoint& point, double area_m2) { energy += film.dose_j_m2(point) * area_m2; });
+  visit_surface(film.mesh(), step_m, [&](const SurfacePoint& point, double area_m2) {
+    energy += film.dose_j_m2(point) * area_m2;
+  });
   return energy;
 }
 
@@ -155,8 +157,8 @@ TEST(Film, BeamsMeetASphereWhereTheRayDoes) {
   int checked = 0;
   for (int i = 0; i < 300; ++i) {
     const Emission emission =
-        emission_at(cell, middle + Eigen::Vector3d(offset(random), offset(random), offset(random)), yaw(random), .3,
-                    rotation(random));
+        emission_at(cell, middle + Eigen::Vector3d(offset(random), offset(random), offset(random)),
+                    yaw(random), .3, rotation(random));
     const Beam beam = beam_from_joints(cell, emission.joints);
     const Eigen::Vector3d from_middle = beam.focus_O - middle;
     const double b = from_middle.dot(beam.direction_O);
@@ -178,8 +180,10 @@ TEST(Film, NoDoseLeaksThroughAWallOfTwoMillimeters) {
   TexturedMesh mesh = square(.01, 0);  // triangles 0 and 1: the lit face
   const double r = .005;
   const double below = -.002;
-  test::add_quad(
-      mesh, {Eigen::Vector3d{-r, r, below}, {r, r, below}, {r, -r, below}, {-r, -r, below}});  // the wall's other face
+  test::add_quad(mesh, {Eigen::Vector3d{-r, r, below},
+                        {r, r, below},
+                        {r, -r, below},
+                        {-r, -r, below}});  // the wall's other face
   test::add_quad(mesh, {Eigen::Vector3d{-r, -r, below},
                         {r, -r, below},
                         {r, r, below},
@@ -255,7 +259,8 @@ TEST(Film, NeedlesAndSliversCarryTheSameDoseAsAPlainSquare) {
     for (const auto& [p, q] : {std::pair{Eigen::Vector3d(r, a, 0), Eigen::Vector3d(r, b, 0)},
                                std::pair{Eigen::Vector3d(-a, r, 0), Eigen::Vector3d(-b, r, 0)}}) {
       const auto first = static_cast<std::uint32_t>(needles.vertices.size());
-      for (const Eigen::Vector3d& vertex : {Eigen::Vector3d(-r, -r, 0), p, q}) needles.vertices.push_back(vertex);
+      for (const Eigen::Vector3d& vertex : {Eigen::Vector3d(-r, -r, 0), p, q})
+        needles.vertices.push_back(vertex);
       needles.triangles.push_back({first, first + 1, first + 2});
     }
   }
@@ -300,15 +305,16 @@ TEST(Film, TheSameBytesForAnyNumberOfThreads) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> offset(-.01, .01);
   for (int i = 0; i < 5000; ++i)
-    emissions.push_back(
-        emission_at(cell, {offset(random), offset(random), .015 + offset(random)}, 0, .5, 300 * offset(random)));
+    emissions.push_back(emission_at(cell, {offset(random), offset(random), .015 + offset(random)}, 0, .5,
+                                    300 * offset(random)));
   std::vector<double> first;
   for (const int threads : {1, 2, 3, 8}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
     Film film(mesh, cell, kCellPitch);
     film.expose(emissions);
     std::vector<double> doses;
-    visit_surface(mesh, kCellPitch, [&](const SurfacePoint& point, double) { doses.push_back(film.dose_j_m2(point)); });
+    visit_surface(mesh, kCellPitch,
+                  [&](const SurfacePoint& point, double) { doses.push_back(film.dose_j_m2(point)); });
     if (first.empty()) first = doses;
     EXPECT_EQ(first, doses) << threads << " threads";
   }

@@ -17,8 +17,8 @@ constexpr double kSideM = .040, kPitchM = .000254;
 /// Upright, under bricks with black joints: four texels of a course's 32.
 TexturedMesh brick_square(int repeats) {
   TexturedMesh mesh = test::with_texture(
-      test::grid(1, 1, [](double u, double v) { return Eigen::Vector3d(u * kSideM, 0, v * kSideM); }), 128, 128,
-      [](int i, int j) { return j % 32 < 4 || (i + j / 32 % 2 * 32) % 64 < 4 ? 0 : 1; });
+      test::grid(1, 1, [](double u, double v) { return Eigen::Vector3d(u * kSideM, 0, v * kSideM); }), 128,
+      128, [](int i, int j) { return j % 32 < 4 || (i + j / 32 % 2 * 32) % 64 < 4 ? 0 : 1; });
   for (auto& corners : mesh.corner_uv)
     for (Eigen::Vector2d& uv : corners) uv *= repeats;
   return mesh;

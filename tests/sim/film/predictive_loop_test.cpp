@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kLoopPitch = .254e-3;
 
-/// Bars of black on white, some thinner than a pitch, and a transparent part: a tone curve made on flat gray gets their
-/// coverage wrong.
+/// Bars of black on white, some thinner than a pitch, and a transparent part: a tone curve made on flat gray
+/// gets their coverage wrong.
 TexturedMesh bars() {
   TexturedMesh mesh = test::square(60 * kLoopPitch);
   mesh.corner_uv = {{Eigen::Vector2d(0, 0), {1, 0}, {1, 1}}, {Eigen::Vector2d(0, 0), {1, 1}, {0, 1}}};
@@ -48,8 +48,8 @@ class PredictiveLoop : public testing::Test {
       sample.pitch_m = kLoopPitch;
     return place_predictively(
         *tone_, *tone_, options_.curve, {.rounds = rounds, .levels = {1}},
-        [&](const ToneField& density) { return place_dots(curve_, density, sample); }, film_predictor(cell_, *tone_),
-        &report_);
+        [&](const ToneField& density) { return place_dots(curve_, density, sample); },
+        film_predictor(cell_, *tone_), &report_);
   }
 
   FidelityFigures fidelity(const DotSequence& dots) const {
@@ -80,13 +80,15 @@ TEST_F(PredictiveLoop, IsTheSameForAnyNumberOfThreads) {
   const DotSequence single = place(1);
   ASSERT_EQ(many.dots.size(), single.dots.size());
   for (std::size_t i = 0; i < many.dots.size(); ++i)
-    ASSERT_EQ(0, std::memcmp(many.dots[i].position_O.data(), single.dots[i].position_O.data(), sizeof(Eigen::Vector3d)))
+    ASSERT_EQ(0, std::memcmp(many.dots[i].position_O.data(), single.dots[i].position_O.data(),
+                             sizeof(Eigen::Vector3d)))
         << i;
 }
 
 TEST_F(PredictiveLoop, LeavesTransparentSurfaceWithoutDots) {
   for (const Dot& dot : place(2).dots)
-    EXPECT_GT(tone_->asked(foot_of_perpendicular(mesh_, dot.triangle, dot.position_O)), 0) << dot.position_O.transpose();
+    EXPECT_GT(tone_->asked(foot_of_perpendicular(mesh_, dot.triangle, dot.position_O)), 0)
+        << dot.position_O.transpose();
 }
 
 TEST_F(PredictiveLoop, KeepsAGivenNumberOfDots) {

@@ -30,11 +30,12 @@ TexturedMesh cube() {
   return mesh;
 }
 
-/// Where each view is expected to show its top left corner, and the corner to the right of it: written down from what
-/// the header promises.
+/// Where each view is expected to show its top left corner, and the corner to the right of it: written down
+/// from what the header promises.
 const std::map<std::string, std::pair<Vector3d, Vector3d>> kTopCorners{
-    {"front", {{-1, -1, 2}, {1, -1, 2}}}, {"right", {{1, -1, 2}, {1, 1, 2}}}, {"back", {{1, 1, 2}, {-1, 1, 2}}},
-    {"left", {{-1, 1, 2}, {-1, -1, 2}}},  {"top", {{-1, 1, 2}, {1, 1, 2}}},   {"bottom", {{-1, -1, 0}, {1, -1, 0}}}};
+    {"front", {{-1, -1, 2}, {1, -1, 2}}}, {"right", {{1, -1, 2}, {1, 1, 2}}},
+    {"back", {{1, 1, 2}, {-1, 1, 2}}},    {"left", {{-1, 1, 2}, {-1, -1, 2}}},
+    {"top", {{-1, 1, 2}, {1, 1, 2}}},     {"bottom", {{-1, -1, 0}, {1, -1, 0}}}};
 
 TEST(OrthographicView, EveryPictureIsUprightAndUnmirrored) {
   const TexturedMesh mesh = cube();

@@ -114,7 +114,8 @@ TEST_F(DobotTest, APulseWaitsForTheMotionBeforeIt) {
   ASSERT_EQ(world.emissions.size(), 1u);
   EXPECT_GT(world.emissions[0].start_s, begun_s + .01);
   EXPECT_NEAR(world.emissions[0].length_s, .01, 1e-12);
-  EXPECT_TRUE(world.emissions[0].is_moving) << "the queue does not wait for the mechanics to settle: it is on record";
+  EXPECT_TRUE(world.emissions[0].is_moving)
+      << "the queue does not wait for the mechanics to settle: it is on record";
 }
 
 TEST_F(DobotTest, ClearingTheQueueLeavesOutputsAsTheyAre) {

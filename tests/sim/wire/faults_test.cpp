@@ -266,12 +266,15 @@ TEST(FaultScriptFile, RefusesWhatItDoesNotMean) {
     return std::string();
   };
   EXPECT_NE(refusal(R"({"kind": "silence", "device": "robot"})").find("has no trigger"), std::string::npos);
-  EXPECT_NE(refusal(R"({"kind": "silent", "device": "robot", "at_s": 1})").find("$.faults[0].kind"), std::string::npos);
+  EXPECT_NE(refusal(R"({"kind": "silent", "device": "robot", "at_s": 1})").find("$.faults[0].kind"),
+            std::string::npos);
   EXPECT_NE(refusal(R"({"kind": "silence", "at_s": 1})").find("device"), std::string::npos);
   EXPECT_NE(refusal(R"({"kind": "silence", "device": "robot", "at_s": 1, "share": 1})").find("share"),
             std::string::npos);
-  EXPECT_NE(refusal(R"({"kind": "axis_stuck", "at_s": 1, "duration_ms": 5})").find("axis"), std::string::npos);
-  EXPECT_NE(refusal(R"({"kind": "device_alarm", "device": "laser", "at_s": 1})").find("no alarm"), std::string::npos);
+  EXPECT_NE(refusal(R"({"kind": "axis_stuck", "at_s": 1, "duration_ms": 5})").find("axis"),
+            std::string::npos);
+  EXPECT_NE(refusal(R"({"kind": "device_alarm", "device": "laser", "at_s": 1})").find("no alarm"),
+            std::string::npos);
   EXPECT_NE(refusal(R"({"kind": "silence", "device": "robot", "at_s": -1})").find("at_s"), std::string::npos);
 }
 

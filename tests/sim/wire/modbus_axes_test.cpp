@@ -31,7 +31,8 @@ class OrientalTest : public testing::Test {
   std::string rtu(const std::string& hex) { return body(world.ask(*line, with_crc(hex))); }
   /// The write of 16 registers that starts a move: 10 degrees in steps, 20,000 steps/s, 100,000 steps/s2.
   static constexpr const char* kMove =
-      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 01 86 A0 00 00 4E 20 00 01 86 A0 00 01 86 A0 00 00 03 E8 "
+      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 01 86 A0 00 00 4E 20 00 01 86 A0 00 01 86 A0 00 00 03 "
+      "E8 "
       "00 00 00 01";
   WireWorld world;
   std::unique_ptr<WireSession> line = world.converse(Conversation::kTableRtu);
@@ -102,12 +103,14 @@ TEST_F(OrientalTest, UnitsAreTwoAndNobodyElseAnswers) {
   world.pass(10);
   EXPECT_NEAR(world.devices.cell().position(kRotation), 10 * kDegree, 1e-12);
   EXPECT_EQ(rtu("03 03 00 7F 00 01"), "");
-  EXPECT_EQ(to_hex(world.ask(*socket, from_hex("00 01 00 00 00 06 03 03 00 7F 00 01"))), "00 01 00 00 00 03 03 83 0B");
+  EXPECT_EQ(to_hex(world.ask(*socket, from_hex("00 01 00 00 00 06 03 03 00 7F 00 01"))),
+            "00 01 00 00 00 03 03 83 0B");
 }
 
 TEST_F(OrientalTest, WritesThenReadsInOneExchange) {
-  EXPECT_EQ(to_hex(world.ask(*socket, from_hex("12 34 00 00 00 0F 01 17 00 5C 00 02 00 5C 00 02 04 00 00 00 07"))),
-            "12 34 00 00 00 07 01 17 04 00 00 00 07");
+  EXPECT_EQ(
+      to_hex(world.ask(*socket, from_hex("12 34 00 00 00 0F 01 17 00 5C 00 02 00 5C 00 02 04 00 00 00 07"))),
+      "12 34 00 00 00 07 01 17 04 00 00 00 07");
 }
 
 TEST_F(OrientalTest, FramesInPiecesAndDamagedFrames) {
@@ -144,9 +147,9 @@ class Cia402Test : public testing::Test {
   unsigned read(unsigned index) {
     const std::string request = fmt::format("01 03 {:02X} {:02X} 00 01", index >> 8, index & 0xff);
     const std::string reply = from_hex(body(world.ask(*line, with_crc(request))));
-    return reply.size() == 5
-               ? static_cast<unsigned>(static_cast<unsigned char>(reply[3]) << 8 | static_cast<unsigned char>(reply[4]))
-               : 0xFFFFF;
+    return reply.size() == 5 ? static_cast<unsigned>(static_cast<unsigned char>(reply[3]) << 8 |
+                                                     static_cast<unsigned char>(reply[4]))
+                             : 0xFFFFF;
   }
   void control(unsigned word) {
     const std::string request = fmt::format("01 06 60 40 {:02X} {:02X}", word >> 8, word & 0xff);

@@ -64,7 +64,8 @@ TEST(TrueCell, AChainMovesByTheInterpolationOfItsController) {
       cell.advance(time_s);
       Joints expected = from;
       put_chain(description, kRobotChain, interpolation, from, to, time_s, expected);
-      for (std::size_t i = 0; i < kAxisCount; ++i) EXPECT_NEAR(cell.profile(i), expected[i], 1e-9) << time_s / end_s;
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        EXPECT_NEAR(cell.profile(i), expected[i], 1e-9) << time_s / end_s;
     }
   }
 }

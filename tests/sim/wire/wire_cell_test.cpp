@@ -35,7 +35,9 @@ class Caller {
     EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
     return Caller(fd);
   }
-  static Caller to_terminal(const std::string& path) { return Caller(::open(path.c_str(), O_RDWR | O_NOCTTY)); }
+  static Caller to_terminal(const std::string& path) {
+    return Caller(::open(path.c_str(), O_RDWR | O_NOCTTY));
+  }
   explicit Caller(int fd) : fd_(fd) {}
   ~Caller() { ::close(fd_); }
   Caller(const Caller&) = delete;
@@ -89,7 +91,8 @@ TEST(WireCellTest, APulseOverTheWireIsOnRecord) {
   EXPECT_EQ(laser.ask("SOUR:AM:EXT DIGITAL\r\n", 4), "OK\r\n");
   EXPECT_EQ(laser.ask("SOUR:POW:LEV:IMM:AMPL 0.02\r\n", 4), "OK\r\n");
   EXPECT_EQ(laser.ask("SOUR:AM:STAT ON\r\n", 4), "OK\r\n");
-  EXPECT_EQ(motion.ask("DO(1,1)wait(7)DO(1,0)Sync()", 51), "0,{},DO(1,1);0,{},wait(7);0,{},DO(1,0);0,{},Sync();");
+  EXPECT_EQ(motion.ask("DO(1,1)wait(7)DO(1,0)Sync()", 51),
+            "0,{},DO(1,1);0,{},wait(7);0,{},DO(1,0);0,{},Sync();");
   const std::lock_guard lock(mutex);
   ASSERT_EQ(emissions.size(), 1u);
   EXPECT_EQ(emissions[0].length_s, .007);
@@ -146,7 +149,8 @@ TEST(WireCellTest, WritesACellFileThatNamesItsEndpoints) {
   WireCell cell(test::small_cell(), scaled(.5));
   const std::string shipped = read_text_file(find_cell("default").string(), 1u << 20);
   const std::string text = wired_cell_text(shipped, cell.endpoints(), .5);
-  EXPECT_NE(text.find("\"dashboard_port\": " + std::to_string(cell.endpoints().dashboard_port)), std::string::npos);
+  EXPECT_NE(text.find("\"dashboard_port\": " + std::to_string(cell.endpoints().dashboard_port)),
+            std::string::npos);
   EXPECT_NE(text.find(cell.endpoints().laser_port), std::string::npos);
   EXPECT_NE(text.find("\"time_scale\": 0.5"), std::string::npos);
   EXPECT_THROW(wired_cell_text("[1]", cell.endpoints(), 1), InputError);

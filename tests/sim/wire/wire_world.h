@@ -65,7 +65,8 @@ inline std::string with_crc(const std::string& hex) {
 
 inline std::string to_hex(const std::string& bytes) {
   std::string text;
-  for (const char c : bytes) text += fmt::format("{}{:02X}", text.empty() ? "" : " ", static_cast<unsigned char>(c));
+  for (const char c : bytes)
+    text += fmt::format("{}{:02X}", text.empty() ? "" : " ", static_cast<unsigned char>(c));
   return text;
 }
 

@@ -1,7 +1,8 @@
-// Loaded with LD_PRELOAD in front of a program that opens serial ports through libserialport, so that it takes a
-// pseudo-terminal for one. The library refuses pseudo-terminals for two reasons: they are not listed in /sys/class/tty,
-// and they have no modem lines. Here they are reported as listed, and the modem lines are emulated: request to send and
-// data terminal ready are accepted, clear to send and data set ready are reported. All other calls are passed on.
+// Loaded with LD_PRELOAD in front of a program that opens serial ports through libserialport, so that it
+// takes a pseudo-terminal for one. The library refuses pseudo-terminals for two reasons: they are not listed
+// in /sys/class/tty, and they have no modem lines. Here they are reported as listed, and the modem lines are
+// emulated: request to send and data terminal ready are accepted, clear to send and data set ready are
+// reported. All other calls are passed on.
 
 #include <dlfcn.h>
 #include <fcntl.h>

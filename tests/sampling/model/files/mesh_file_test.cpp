@@ -19,10 +19,10 @@ TEST(ObjFile, ReadsMaterialsTexturesAndSeams) {
   const ModelOnDisk disk;
   disk.write("rgb.png", "x");
   disk.write("m.mtl", "newmtl a\nKd 0.5 0.5 0.5\nd 0.25\nnewmtl b\r\nmap_Kd -s 2 2 2 rgb.png\r\nTr 0.5\n");
-  const Model model =
-      disk.load("m.obj",
-                "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 .25\n"
-                "usemtl a\nf 1 2 3\nusemtl b\nf 1/1 3/3 4/4\nf -4/5 -3/5 -1/5\nusemtl c\nf 1 2 \\\n4\n");
+  const Model model = disk.load(
+      "m.obj",
+      "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 .25\n"
+      "usemtl a\nf 1 2 3\nusemtl b\nf 1/1 3/3 4/4\nf -4/5 -3/5 -1/5\nusemtl c\nf 1 2 \\\n4\n");
   ASSERT_EQ(model.mesh.triangle_count(), 4u);
   const auto material = [&](std::size_t t) { return model.mesh.materials[model.mesh.material_index[t]]; };
   EXPECT_EQ(material(0).source, ColorSource::kMaterial);
@@ -31,7 +31,8 @@ TEST(ObjFile, ReadsMaterialsTexturesAndSeams) {
   EXPECT_EQ(material(1).source, ColorSource::kTexture);
   EXPECT_DOUBLE_EQ(material(1).opacity, .5);
   EXPECT_EQ(model.mesh.corner_uv[1][1], Vector2d(1, 1));
-  EXPECT_EQ(model.mesh.corner_uv[2][0], Vector2d(.5, .25)) << "texture coordinates belong to corners, not points";
+  EXPECT_EQ(model.mesh.corner_uv[2][0], Vector2d(.5, .25))
+      << "texture coordinates belong to corners, not points";
   EXPECT_EQ(model.mesh.corner(2, 0), Vector3d(0, 0, 0)) << "relative indices count from where they stand";
   EXPECT_EQ(material(3).source, ColorSource::kNone);
   EXPECT_EQ(model.files.size(), 3u);
@@ -50,8 +51,8 @@ TEST(ObjFile, ResolvesRelativeIndicesWhereTheyStand) {
 TEST(ObjFile, KeepsFacesThatDoNotFitTogether) {
   const ModelOnDisk disk;
   // Three triangles on one edge, one of them twice: mesh_repair decides, not the reader.
-  const Model model =
-      disk.load("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\nf 1 2 5\n");
+  const Model model = disk.load(
+      "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\nf 1 2 5\n");
   EXPECT_EQ(model.mesh.triangle_count(), 4u);
   EXPECT_EQ(model.mesh.vertices.size(), 5u);
 }
@@ -82,7 +83,8 @@ TEST(ObjFile, ReportsWhatIsWrongWithItsLine) {
                 .find("m.obj:4: 1 faces were dropped: they name points that do not exist"),
             std::string::npos);
   EXPECT_NE(disk.refusal("m.obj", points).find("there is no face in it"), std::string::npos);
-  EXPECT_TRUE(warns(disk.load("m.obj", points + "f 1 2 3\nf 1 1 2\n"), "m.obj:5: 1 faces with fewer than three"));
+  EXPECT_TRUE(
+      warns(disk.load("m.obj", points + "f 1 2 3\nf 1 1 2\n"), "m.obj:5: 1 faces with fewer than three"));
   EXPECT_EQ(disk.load("m.obj", points + "v nan 0 0\nf 1 2 3\nf 1 2 4\n").mesh.triangle_count(), 1u);
 }
 
@@ -101,7 +103,9 @@ TEST(ObjFile, TransparencyOfOneIsTakenAsOpacity) {
   const ModelOnDisk disk;
   const auto opacity = [&](const std::string& line) {
     disk.write("m.mtl", "newmtl a\nKd 0 0 0\n" + line + "\n");
-    return disk.load("m.obj", "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh.materials[0].opacity;
+    return disk.load("m.obj", "mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        .mesh.materials[0]
+        .opacity;
   };
   EXPECT_EQ(opacity("Tr 1"), 1);
   EXPECT_EQ(opacity("Tr 0.25"), .75);
@@ -114,37 +118,40 @@ TEST(ObjFile, ReadsNothingOutsideItsFolder) {
   std::ofstream(disk.outer() / "secret.mtl") << "newmtl a\nKd 0 0 0\n";
   std::ofstream(disk.outer() / "secret.png") << "x";
   disk.write("m.mtl", "newmtl a\nmap_Kd ../secret.png\n");
-  const Model model =
-      disk.load("m.obj", "mtllib ../secret.mtl\nmtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const Model model = disk.load(
+      "m.obj", "mtllib ../secret.mtl\nmtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_TRUE(warns(model, "outside the model's folder"));
-  EXPECT_GT(model.mesh.corner_luminance[0][0], .5) << "the default gray, not the black of the library outside";
+  EXPECT_GT(model.mesh.corner_luminance[0][0], .5)
+      << "the default gray, not the black of the library outside";
   EXPECT_TRUE(model.mesh.textures.empty());
   EXPECT_EQ(model.files.size(), 2u);
 }
 
 const std::string kPlyPoints = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 
-std::string ply(const std::string& vertex_properties, const std::string& face_properties, const std::string& body,
-                int faces = 1, const std::string& comment = "") {
+std::string ply(const std::string& vertex_properties, const std::string& face_properties,
+                const std::string& body, int faces = 1, const std::string& comment = "") {
   return "ply\nformat ascii 1.0\n" + comment +
          "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n" + vertex_properties +
-         "element face " + std::to_string(faces) + "\nproperty list uchar int vertex_indices\n" + face_properties +
-         "end_header\n" + body;
+         "element face " + std::to_string(faces) + "\nproperty list uchar int vertex_indices\n" +
+         face_properties + "end_header\n" + body;
 }
 
 TEST(PlyFile, ReadsTextureCoordinatesUnderEveryName) {
   const ModelOnDisk disk;
   disk.write("rgb.png", "x");
   for (const auto& [u, v] : {std::pair("u", "v"), std::pair("s", "t"), std::pair("texture_u", "texture_v")}) {
-    const Model model = disk.load(
-        "m.ply", ply(std::string("property float ") + u + "\nproperty float " + v + "\n", "",
-                     "0 0 0 .1 .2\n1 0 0 .3 .4\n0 1 0 .5 .6\n0 0 1 0 0\n3 0 1 2", 1, "comment TextureFile rgb.png\n"));
+    const Model model =
+        disk.load("m.ply", ply(std::string("property float ") + u + "\nproperty float " + v + "\n", "",
+                               "0 0 0 .1 .2\n1 0 0 .3 .4\n0 1 0 .5 .6\n0 0 1 0 0\n3 0 1 2", 1,
+                               "comment TextureFile rgb.png\n"));
     EXPECT_EQ(model.mesh.materials[0].source, ColorSource::kTexture);
     EXPECT_LT((model.mesh.corner_uv[0][1] - Vector2d(.3, .4)).norm(), 1e-6) << u;
   }
-  const Model corners = disk.load("m.ply", ply("", "property list uchar float texcoord\n",
-                                               kPlyPoints + "3 0 1 2 6 .1 .2 .3 .4 .5 .6\n3 0 2 3 6 1 0 1 1 0 1\n", 2,
-                                               "comment TextureFile rgb.png\n"));
+  const Model corners =
+      disk.load("m.ply", ply("", "property list uchar float texcoord\n",
+                             kPlyPoints + "3 0 1 2 6 .1 .2 .3 .4 .5 .6\n3 0 2 3 6 1 0 1 1 0 1\n", 2,
+                             "comment TextureFile rgb.png\n"));
   EXPECT_LT((corners.mesh.corner_uv[0][2] - Vector2d(.5, .6)).norm(), 1e-6);
   EXPECT_LT((corners.mesh.corner_uv[1][0] - Vector2d(1, 0)).norm(), 1e-6);
   EXPECT_EQ(corners.up, UpAxis::kZ);
@@ -153,7 +160,8 @@ TEST(PlyFile, ReadsTextureCoordinatesUnderEveryName) {
 TEST(PlyFile, ReadsColorsOfPointsAndFaces) {
   const ModelOnDisk disk;
   const std::string rgb = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  Model model = disk.load("m.ply", ply(rgb, "", "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n0 0 1 0 0 0\n3 0 1 2\n"));
+  Model model =
+      disk.load("m.ply", ply(rgb, "", "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n0 0 1 0 0 0\n3 0 1 2\n"));
   EXPECT_EQ(model.mesh.materials[0].source, ColorSource::kColors);
   EXPECT_NEAR(model.mesh.corner_luminance[0][1], .7152, 1e-3);
   model = disk.load("m.ply", ply("", rgb, kPlyPoints + "4 0 1 2 3 255 255 255\n3 0 1 2 0 0 0\n", 2));
@@ -164,8 +172,8 @@ TEST(PlyFile, ReadsColorsOfPointsAndFaces) {
 
 TEST(PlyFile, ReadsEveryTypeThatCountsLists) {
   const ModelOnDisk disk;
-  for (const char* count :
-       {"char", "uchar", "int8", "uint8", "short", "ushort", "int16", "uint16", "int", "uint", "int32", "uint32"}) {
+  for (const char* count : {"char", "uchar", "int8", "uint8", "short", "ushort", "int16", "uint16", "int",
+                            "uint", "int32", "uint32"}) {
     std::string text = ply("", "", kPlyPoints + "3 0 1 2\n");
     text.replace(text.find("uchar int"), 5, count);
     EXPECT_EQ(disk.load("m.ply", text).mesh.triangle_count(), 1u) << count;
@@ -187,15 +195,17 @@ std::string bytes_of(std::initializer_list<Number> numbers, bool is_big_endian =
 TEST(PlyFile, ReadsBinaryInBothByteOrdersAndDoublePrecision) {
   const ModelOnDisk disk;
   for (const bool is_big : {false, true}) {
-    const std::string header = std::string("ply\nformat ") + (is_big ? "binary_big_endian" : "binary_little_endian") +
-                               " 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
-                               "property ushort red\nproperty ushort green\nproperty ushort blue\n"
-                               "element extra 1\nproperty list uchar short skipped\nproperty int more\n"
-                               "element face 1\nproperty list uchar int vertex_index\nend_header\n";
+    const std::string header =
+        std::string("ply\nformat ") + (is_big ? "binary_big_endian" : "binary_little_endian") +
+        " 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+        "property ushort red\nproperty ushort green\nproperty ushort blue\n"
+        "element extra 1\nproperty list uchar short skipped\nproperty int more\n"
+        "element face 1\nproperty list uchar int vertex_index\nend_header\n";
     std::string body;
     for (const auto& p : {Vector3d(1e6, 0, 0), Vector3d(1e6 + 1e-9, 0, 0), Vector3d(0, 1, 0)})
       body += bytes_of({p.x(), p.y(), p.z()}, is_big) + bytes_of<std::uint16_t>({0, 65535, 0}, is_big);
-    body += bytes_of<std::uint8_t>({2}) + bytes_of<std::int16_t>({-5, 7}, is_big) + bytes_of<std::int32_t>({9}, is_big);
+    body += bytes_of<std::uint8_t>({2}) + bytes_of<std::int16_t>({-5, 7}, is_big) +
+            bytes_of<std::int32_t>({9}, is_big);
     body += bytes_of<std::uint8_t>({3}) + bytes_of<std::int32_t>({0, 1, 2}, is_big);
     const Model model = disk.load("m.ply", header + body);
     ASSERT_EQ(model.mesh.triangle_count(), 1u);
@@ -241,27 +251,31 @@ TEST(PlyFile, BelievesNoCount) {
   EXPECT_NE(disk.refusal("m.ply", with("vertex 4", "vertex 4000000000"))
                 .find("m.ply:3: the element vertex has more entries than the limit"),
             std::string::npos);
-  EXPECT_NE(disk.refusal("m.ply", with("vertex 4", "vertex 400000")).find("promises more than the file holds"),
-            std::string::npos);
+  EXPECT_NE(
+      disk.refusal("m.ply", with("vertex 4", "vertex 400000")).find("promises more than the file holds"),
+      std::string::npos);
   EXPECT_NE(disk.refusal("m.ply", with("3 0 1 2", "2000000000 0 1")).find("ends early"), std::string::npos);
   EXPECT_NE(disk.refusal("m.ply", with("1 0 0", "1 nan 0")), "");
   EXPECT_NE(disk.refusal("m.ply", with("3 0 1 2", "3 0 1 7")).find("no usable face"), std::string::npos);
-  EXPECT_NE(disk.refusal("m.ply", with("face 1", "face 0")).find("point clouds have no surface"), std::string::npos);
-  EXPECT_NE(disk.refusal("m.ply", with("float z", "float w")).find("no property z"), std::string::npos);
-  EXPECT_NE(disk.refusal("m.ply", "ply\nformat ascii 1.0\nelement vertex 1\n").find("the header does not end"),
+  EXPECT_NE(disk.refusal("m.ply", with("face 1", "face 0")).find("point clouds have no surface"),
             std::string::npos);
+  EXPECT_NE(disk.refusal("m.ply", with("float z", "float w")).find("no property z"), std::string::npos);
+  EXPECT_NE(
+      disk.refusal("m.ply", "ply\nformat ascii 1.0\nelement vertex 1\n").find("the header does not end"),
+      std::string::npos);
 }
 
 TEST(OffFile, ReadsCommentsCountsOnTheFirstLineAndColors) {
   const ModelOnDisk disk;
-  Model model = disk.load(
-      "m.off",
-      "OFF 4 2 0 # counts here\n0 0 0\n\n1 0 0 # a comment\n0 1 0\n0 0 1\n3 0 1 2 255 255 255\n3 0 1 3 0.0 0.0 0.0\n");
+  Model model = disk.load("m.off",
+                          "OFF 4 2 0 # counts here\n0 0 0\n\n1 0 0 # a comment\n0 1 0\n0 0 1\n3 0 1 2 255 "
+                          "255 255\n3 0 1 3 0.0 0.0 0.0\n");
   EXPECT_EQ(model.mesh.triangle_count(), 2u);
   EXPECT_EQ(model.mesh.materials[0].source, ColorSource::kColors);
   EXPECT_EQ(model.mesh.corner_luminance[0][0], 1);
   EXPECT_EQ(model.mesh.corner_luminance[1][0], 0);
-  model = disk.load("m.off", "COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 255\n3 0 1 2\n");
+  model =
+      disk.load("m.off", "COFF\n3 1 0\n0 0 0 255 0 0 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 255\n3 0 1 2\n");
   EXPECT_NEAR(model.mesh.corner_luminance[0][1], .7152, 1e-3);
   model = disk.load("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
   EXPECT_EQ(model.mesh.materials[0].source, ColorSource::kMaterial) << "nothing is left of the file before";
@@ -272,8 +286,8 @@ TEST(OffFile, ReadsCommentsCountsOnTheFirstLineAndColors) {
 
 TEST(OffFile, ReadsFacesAndVerticesThatSpanLines) {
   const ModelOnDisk disk;
-  const Model model =
-      disk.load("m.off", "OFF\n4 2 0\n0 0\n0\n1 0 0\n0 1 0\n0 0 1\n3 0 1\n  # half of it\n 2 255 0 0\n4\n0 1\n2 3\n");
+  const Model model = disk.load(
+      "m.off", "OFF\n4 2 0\n0 0\n0\n1 0 0\n0 1 0\n0 0 1\n3 0 1\n  # half of it\n 2 255 0 0\n4\n0 1\n2 3\n");
   EXPECT_EQ(model.mesh.triangle_count(), 3u);
   EXPECT_NEAR(model.mesh.corner_luminance[0][0], .2126, 1e-3) << "the color follows the last corner";
   EXPECT_EQ(disk.refusal("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0\n1 x\n"),
@@ -295,7 +309,9 @@ std::string binary_stl(std::uint32_t promised, const std::vector<std::array<floa
   std::string bytes = std::string("solid but binary").append(64, ' ');
   bytes.append(reinterpret_cast<const char*>(&promised), 4);
   for (const auto& triangle : triangles) {
-    bytes.append(12, '\0').append(reinterpret_cast<const char*>(triangle.data()), sizeof triangle).append(2, '\0');
+    bytes.append(12, '\0')
+        .append(reinterpret_cast<const char*>(triangle.data()), sizeof triangle)
+        .append(2, '\0');
   }
   return bytes;
 }
@@ -318,21 +334,24 @@ TEST(StlFile, ReadsTextAndBinaryThatBeginsLikeText) {
   EXPECT_TRUE(warns(model, "1 triangles with coordinates out of range were dropped"));
   std::string lie = binary_stl(4'000'000'000u, {triangle});
   lie[0] = 'S', lie[1] = '!';
-  EXPECT_NE(disk.refusal("m.stl", lie).find("promises 4000000000 triangles, the file holds 1"), std::string::npos);
+  EXPECT_NE(disk.refusal("m.stl", lie).find("promises 4000000000 triangles, the file holds 1"),
+            std::string::npos);
 }
 
 TEST(StlFile, IsReadInDoublePrecisionWhereItIsText) {
   const ModelOnDisk disk;
-  const Model model = disk.load("m.stl",
-                                "solid\nfacet normal 0 0 1\nouter loop\nvertex 1000000 0 0\nvertex 1000000.000000001 "
-                                "0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+  const Model model =
+      disk.load("m.stl",
+                "solid\nfacet normal 0 0 1\nouter loop\nvertex 1000000 0 0\nvertex 1000000.000000001 "
+                "0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
   EXPECT_EQ(model.mesh.corner(0, 0).x(), kFar);
   EXPECT_EQ(model.mesh.corner(0, 1).x(), kNear);
 }
 
 TEST(StlFile, GivesEqualCornersOnePoint) {
   const ModelOnDisk disk;
-  const Model model = disk.load("m.stl", binary_stl(2, {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {1, 0, 0, -0.f, 0, 0, 0, 0, 1}}));
+  const Model model =
+      disk.load("m.stl", binary_stl(2, {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {1, 0, 0, -0.f, 0, 0, 0, 0, 1}}));
   EXPECT_EQ(model.mesh.vertices.size(), 4u);
 }
 
