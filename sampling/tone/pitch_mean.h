@@ -38,7 +38,7 @@ struct PitchInTexture {
 Eigen::Vector2d texels_per_pitch(const std::array<Eigen::Vector2d, 2>& texels,
                                  const std::array<Eigen::Vector2d, 2>& space_m, double pitch_m);
 
-/// Rounds to steps of so many octaves. No step is beyond a grid of one texel.
+/// Rounds to steps of this many octaves. No step is beyond a grid of one texel.
 PitchInTexture round_to_steps(const Eigen::Vector2d& texels_per_pitch, double octaves, int width, int height);
 
 /// The grid of asked tones for a texture.

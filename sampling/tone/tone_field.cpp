@@ -25,7 +25,7 @@ constexpr double kMinTexels = 1e-3;
 /// Of all layers together, about; and the finest that a texel is cut, along a side.
 constexpr double kRefinedTexels = 12e6;
 constexpr int kMaxRefinement = 15;
-/// With means over a pitch: so many texels for one of the textures', and steps between sizes of a pitch, in
+/// With means over a pitch: this many texels for one of the textures', and steps between sizes of a pitch, in
 /// octaves.
 constexpr double kAveragedTexels = 2;
 constexpr double kFinestOctaves = .5, kCoarsestOctaves = 16;

@@ -137,7 +137,7 @@ Original fine_picture(const Original& picture) {
   });
 }
 
-/// Means over squares of so many texels a side, twice: nearly a Gaussian of sigma .4 sides.
+/// Means over squares of this many texels a side, twice: nearly a Gaussian of sigma .4 sides.
 Original blurred(const Original& picture, double side) {
   Original result = picture;
   const int n = picture.width, reach = std::max(0, static_cast<int>(std::lround((side - 1) / 2)));
