@@ -24,6 +24,8 @@ using Json = nlohmann::ordered_json;
 
 /// The daemon copies the model, its textures and inlines before it answers.
 constexpr auto kSubmitTimeout = std::chrono::seconds(60);
+/// `hilbrush list` shows the newest jobs up to this number.
+constexpr std::size_t kListedJobs = 100;
 
 struct JobFlags {
   std::string id;
@@ -75,7 +77,16 @@ int submit(const CommandContext& context, const JobFlags& flags) {
 
 int list(const CommandContext& context, const JobFlags& flags) {
   RpcClient client(context.socket_path);
-  const Json result = client.call("job.list", flags.is_queue ? Json{{"order", "queue"}} : Json());
+  Json params = flags.is_queue ? Json{{"order", "queue"}} : Json();
+  Json result = client.call("job.list", params);
+  // A page ends before it gets large: the rest of the daemon's default number is asked for.
+  while (result.is_object() && member(result, "next").is_string() && result["jobs"].size() < kListedJobs) {
+    params["after"] = result["next"];
+    params["limit"] = kListedJobs - result["jobs"].size();
+    const Json page = client.call("job.list", params);
+    for (const Json& job : member(page, "jobs")) result["jobs"].push_back(job);
+    result["next"] = member(page, "next");
+  }
   if (context.is_json)
     context.terminal.out << result.dump() << std::endl;
   else
