@@ -94,10 +94,11 @@ TEST(AxisMotion, CoordinatedAxesRunStraightWithinTheirLimits) {
           EXPECT_LE(std::abs(motions[i].speed(t + dt) - motions[i].speed(t)),
                     limits[i].acceleration * dt * (1 + 1e-6))
               << "seed " << seed;
-          if (t > go_s)
+          if (t > go_s) {
             EXPECT_NEAR(motions[i].position(t),
                         motions[i].position(go_s) + share * (target[i] - motions[i].position(go_s)), 1e-9)
                 << "seed " << seed;
+          }
         }
       }
       for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(motions[i].position(end_s), target[i]);

@@ -51,8 +51,8 @@ inline TexturedMesh square(double size, double height = 0, float luminance = 0) 
   return mesh;
 }
 
-/// A sphere around (0, 0, radius), facing outwards, of 2 * rings * rings triangles or so.
-inline TexturedMesh sphere(double radius, int rings) {
+/// A ball around (0, 0, radius), facing outwards, of 2 * rings * rings triangles or so.
+inline TexturedMesh ball(double radius, int rings) {
   TexturedMesh mesh;
   const int around = 2 * rings;
   const auto place = [&](int i, int j) {

@@ -41,6 +41,65 @@ TEST(ModelFile, IsGunzippedByItsFirstBytes) {
             std::string::npos);
 }
 
+TEST(ModelFile, IsGunzippedWithAllItsMembers) {
+  const ModelOnDisk disk;
+  const std::size_t half = kBox.size() / 2;
+  const std::string members = gzipped(kBox.substr(0, half)) + gzipped("") + gzipped(kBox.substr(half));
+  EXPECT_EQ(disk.load("members.wrl", members).mesh.triangle_count(), 12u);
+  EXPECT_EQ(disk.load("padded.wrl", members + std::string(100, '\0')).mesh.triangle_count(), 12u);
+  EXPECT_NE(disk.refusal("cut.wrl", members.substr(0, members.size() - 12)).find("truncated or corrupt"),
+            std::string::npos);
+}
+
+TEST(ModelFile, LimitsItsFilesTogether) {
+  const ModelOnDisk disk;
+  ModelLimits limits;
+  limits.file_bytes = 10'000;
+  std::string inlines = "#VRML V2.0 utf8\n";
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = "part" + std::to_string(i) + ".wrl";
+    disk.write(name, kBox + std::string(9'000, ' '));
+    inlines += "Inline { url \"" + name + "\" }\n";
+  }
+  EXPECT_NE(
+      disk.refusal("model.wrl", inlines, limits).find("together are larger than the limit of 40000 bytes"),
+      std::string::npos);
+}
+
+TEST(ModelFile, ReadsAnImageOnceWhateverItIsCalled) {
+  const ModelOnDisk disk;
+  disk.write("a.png", "x");
+  disk.write("broken.png", "x");
+  int reads = 0;
+  const ImageReader reader = [&](const fs::path& file, std::size_t) -> Result<Texture> {
+    ++reads;
+    if (file.filename() == "broken.png") return Failure{"it is broken"};
+    return Texture{2, 1, 3, {0, 1}, {}, ""};
+  };
+  std::string mtl;
+  std::string obj = "mtllib m.mtl\nmtllib ./m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  std::string ply = "ply\nformat ascii 1.0\n";
+  std::string dots = "./";
+  for (int i = 0; i < 20; ++i, dots += "./") {
+    const std::string material = "m" + std::to_string(i);
+    mtl += "newmtl " + material + "\nmap_Kd " + dots + (i % 2 ? "a.png\n" : "broken.png\n");
+    obj += "usemtl " + material + "\nf 1 2 3\n";
+    ply += "comment TextureFile " + dots + "broken.png\n";
+  }
+  disk.write("m.mtl", mtl);
+  const Model model = load_model(disk.write("m.obj", obj), reader);
+  EXPECT_EQ(reads, 2);
+  EXPECT_EQ(model.mesh.textures.size(), 1u);
+  reads = 0;
+  load_model(
+      disk.write("m.ply",
+                 ply + "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement "
+                       "face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 "
+                       "0\n3 0 1 2\n"),
+      reader);
+  EXPECT_EQ(reads, 1);
+}
+
 TEST(ModelFile, RefusesWhatItCannotReadAndSaysWhatItIs) {
   const ModelOnDisk disk;
   EXPECT_NE(disk.refusal("m.glb", std::string("glTF\2\0\0\0", 8)).find("glTF"), std::string::npos);

@@ -149,7 +149,7 @@ TEST(Film, BeamsLandWhereTheClosedFormSays) {
 TEST(Film, BeamsMeetASphereWhereTheRayDoes) {
   const CellDescription cell = handmade_cell();
   const double radius = .02;
-  const TexturedMesh mesh = test::sphere(radius, 400);
+  const TexturedMesh mesh = test::ball(radius, 400);
   Film film(mesh, cell, kCellPitch);
   const Eigen::Vector3d middle(0, 0, radius);
   std::mt19937_64 random(5);
@@ -300,7 +300,7 @@ TEST(Film, FilmPointsStandForTheAreaOfTheSurface) {
 
 TEST(Film, TheSameBytesForAnyNumberOfThreads) {
   const CellDescription cell = handmade_cell();
-  const TexturedMesh mesh = test::sphere(.015, 30);
+  const TexturedMesh mesh = test::ball(.015, 30);
   std::vector<Emission> emissions;
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> offset(-.01, .01);

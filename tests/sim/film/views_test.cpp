@@ -54,7 +54,7 @@ TEST(OrthographicView, EveryPictureIsUprightAndUnmirrored) {
 }
 
 TEST(OrthographicView, ShowsTheNearestFaceAndTheRightPlaceOnIt) {
-  const TexturedMesh mesh = test::sphere(.01, 40);
+  const TexturedMesh mesh = test::ball(.01, 40);
   const OrthographicView view(mesh, picture_views()[0], 1e-4, 3);
   int film = 0;
   std::vector<OrthographicView::Pixel> row;
