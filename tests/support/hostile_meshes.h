@@ -21,9 +21,9 @@ inline TexturedMesh bow_tie() {
 inline TexturedMesh klein_bottle(int nu = 60, int nv = 24) {
   TexturedMesh mesh = grid(
       nu, nv,
-      [](double u, double v) {
+      [nv](double u, double v) {
         const double turn = 2 * kPi * u;
-        const double a = 2 * kPi * v;
+        const double a = 2 * kPi * (v + .5 / nv);  // no vertex lies where it passes through itself
         const double c = std::cos(turn / 2);
         const double s = std::sin(turn / 2);
         const double r = .025 + .01 * (c * std::sin(a) - s * std::sin(2 * a));
@@ -33,7 +33,7 @@ inline TexturedMesh klein_bottle(int nu = 60, int nv = 24) {
       false, true);
   // The last column lies on the first one, upside down.
   const auto at = [&](int i, int j) { return static_cast<std::size_t>((j + nv) % nv * (nu + 1) + i); };
-  for (int j = 0; j < nv; ++j) mesh.vertices[at(nu, j)] = mesh.vertices[at(0, nv - j)];
+  for (int j = 0; j < nv; ++j) mesh.vertices[at(nu, j)] = mesh.vertices[at(0, nv - 1 - j)];
   return mesh;
 }
 
