@@ -9,12 +9,12 @@
 namespace hilbrush {
 
 enum class PlaneSet {
-  kRandom,      ///< pairs of independent numbers
-  kJittered,    ///< one random point in each of ceil(sqrt N)^2 equal squares, row by row: ceil(sqrt N)^2
-                ///< points, not N
-  kHalton,      ///< (psi_2(k), psi_3(k)), k = 0 .. N - 1
-  kHammersley,  ///< (psi_2(k), (k + 1/2) / N), as Wong, Luk and Heng, "Sampling with Hammersley and Halton
-                ///< points", 1997
+  kRandom,        ///< pairs of independent numbers
+  kJittered,      ///< one random point in each of ceil(sqrt N)^2 equal squares, row by row: ceil(sqrt N)^2
+                  ///< points, not N
+  kHalton,        ///< (psi_2(k), psi_3(k)), k = 0 .. N - 1
+  kHammersley,    ///< (psi_2(k), (k + 1/2) / N), as Wong, Luk and Heng, "Sampling with Hammersley and Halton
+                  ///< points", 1997
   kSobol,         ///< ACM algorithm 659, the first 100 points dropped
   kNiederreiter,  ///< ACM algorithm 738 in base 2, the first 100 points dropped
 };

@@ -83,7 +83,7 @@ struct Spectrum {
                    ///< turn from +x; empty on surfaces, which have no common direction
   double below_half = 0, below_quarter = 0;  ///< mean power over the disc of frequencies below that share of
                                              ///< the principal one, 0 left out
-  double peak = 0;        ///< largest ring
+  double peak = 0;                           ///< largest ring
   double anisotropy = 0;  ///< largest relative deviation of `directions` from their mean; 0 on surfaces
 };
 
