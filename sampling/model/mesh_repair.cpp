@@ -180,7 +180,8 @@ bool are_oriented_alike(const std::vector<Triangle>& triangles, TriangleSide a, 
 /// the part already was. Edges where that is impossible (a Moebius strip has one) are cut.
 class Orientation {
  public:
-  Orientation(TexturedMesh& mesh, const EdgeTable& edges) : mesh_(mesh), partners_(mesh.triangle_count()) {
+  Orientation(TexturedMesh& mesh, const EdgeTable& edges)
+      : mesh_(mesh), partners_(mesh.triangle_count()), is_cut_(mesh.triangle_count(), 0) {
     for (auto& sides : partners_) sides.fill(kNoSide);
     for (const EdgeGroup& group : edges.groups)
       if (group.end - group.begin == 2) join(edges.sides[group.begin], edges.sides[group.begin + 1]);
@@ -207,6 +208,8 @@ class Orientation {
   }
 
   std::size_t cut_count() const { return cut_count_; }
+  /// Whether an edge of the triangle was cut: its part has one side only.
+  bool is_cut(std::uint32_t t) const { return is_cut_[t] != 0; }
   /// By triangle and side: the side it is joined to.
   Neighbors& partners() { return partners_; }
   void turn_with_partners(std::uint32_t t) {
@@ -251,6 +254,7 @@ class Orientation {
         if (is_alike == (state[t] == state[other.triangle])) continue;
         partners_[t][s] = partners_[other.triangle][other.side] = kNoSide;
         ++cut_count_;
+        is_cut_[t] = is_cut_[other.triangle] = 1;
       }
   }
 
@@ -258,6 +262,7 @@ class Orientation {
   Neighbors partners_;
   std::vector<std::uint32_t> to_turn_;
   std::size_t cut_count_ = 0;
+  std::vector<char> is_cut_;  ///< by triangle
 };
 
 /// A triangle side on an edge that more than two triangles share.
@@ -416,7 +421,8 @@ Turned turn_parts_outwards(const TexturedMesh& mesh, Orientation& orientation) {
   for (std::uint32_t seed = 0; seed < is_seen.size(); ++seed) {
     if (is_seen[seed]) continue;
     const Part part = collect_part(mesh, orientation.partners(), seed, is_seen);
-    if (!is_inside_out(mesh, part)) continue;
+    const auto is_cut = [&](std::uint32_t t) { return orientation.is_cut(t); };
+    if (std::ranges::any_of(part.triangles, is_cut) || !is_inside_out(mesh, part)) continue;
     for (const auto t : part.triangles) orientation.turn_with_partners(t);
     (part.boundary.empty() ? turned.closed : turned.almost_closed) += part.triangles.size();
   }
