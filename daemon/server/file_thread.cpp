@@ -4,7 +4,7 @@
 
 namespace hilbrush {
 
-FileThread::FileThread() : thread_([this](std::stop_token ending) { work(std::move(ending)); }) {}
+FileThread::FileThread() : thread_([this](const std::stop_token& ending) { work(ending); }) {}
 
 FileThread::~FileThread() {
   thread_.request_stop();
@@ -27,7 +27,7 @@ void FileThread::cancel(TaskId id) {
   std::erase_if(waiting_, [id](const Task& task) { return task.id == id; });
 }
 
-void FileThread::work(std::stop_token ending) {
+void FileThread::work(const std::stop_token& ending) {
   for (;;) {
     std::unique_lock lock(mutex_);
     if (!changed_.wait(lock, ending, [this] { return !waiting_.empty(); }) || ending.stop_requested()) return;

@@ -37,7 +37,7 @@ class FileThread {
     std::function<void(std::stop_token)> work;
     std::stop_source stop;
   };
-  void work(std::stop_token ending);
+  void work(const std::stop_token& ending);
 
   std::mutex mutex_;
   std::condition_variable_any changed_;

@@ -186,14 +186,14 @@ PipelineChildren::~PipelineChildren() {
   ::close(wake_fd_);
 }
 
-PipelineChildren::ChildId PipelineChildren::start(ChildOrder order) {
+PipelineChildren::ChildId PipelineChildren::start(const ChildOrder& order) {
   ChildId id = 0;
   bool is_full = false;
   {
     const std::lock_guard lock(mutex_);
     id = ++last_id_;
     is_full = waiting_.size() >= kQueueMax;
-    if (!is_full) waiting_.push_back({id, std::move(order)});
+    if (!is_full) waiting_.push_back({id, order});
   }
   if (is_full) {
     ChildOutcome outcome;

@@ -65,7 +65,7 @@ class PipelineChildren {
   PipelineChildren(const PipelineChildren&) = delete;
   PipelineChildren& operator=(const PipelineChildren&) = delete;
 
-  ChildId start(ChildOrder order);
+  ChildId start(const ChildOrder& order);
   /// Kills the child if it runs, drops its order if it waits; its on_end may still have been called before.
   void cancel(ChildId id);
 

@@ -24,7 +24,8 @@ using Eigen::Vector2d, Eigen::Vector3d;
 TriangleMasses measure_masses(const TexturedMesh& mesh, const ToneField* tone) {
   const std::size_t n = mesh.triangle_count();
   TriangleMasses result{std::vector<double>(n), std::vector<std::uint8_t>(n, 1)};
-  auto& [masses, is_even] = result;
+  std::vector<double>& masses = result.masses;
+  std::vector<std::uint8_t>& is_even = result.is_even;
   tbb::parallel_for(std::size_t{0}, n, [&](std::size_t t) {
     if (!tone) {
       masses[t] = mesh.area_vector(t).norm();
